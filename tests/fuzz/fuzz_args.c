@@ -38,7 +38,7 @@ enum { COMMANDS = sizeof commands / sizeof *commands, WORDS_MAX = 40, VALUES = 6
 static void command_line(const command *c, char *text)
 {
     char name[] = "fuzz", *argv[WORDS_MAX + 1] = { name };
-    const char *operand[ARGS_OPERANDS_MAX];
+    const char *operand[ARGS_OPERANDS_MAX + 1];
     int argc = 1;
     for (char *at = text; *at && argc < WORDS_MAX; argc++) {
         argv[argc] = at;

@@ -17,10 +17,6 @@ import subprocess
 import sys
 import tempfile
 
-EBPO, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
-SCALE = float(os.environ.get("EBPO_TEST_SCALE", 1))
-CASES = int(sys.argv[3]) if len(sys.argv) > 3 else max(2, round(40 * SCALE))
-SEED = int(sys.argv[4]) if len(sys.argv) > 4 else 1
 MODELS = ["bunny_closed", "armadillo", "dragon100k", "lucy100k", "selfint_A", "cheese_g133", "fertility",
           "twin7081_left", "twin7081_right", "cad_adis16480", "skull", "xyzrgb_dragon28k", "thingi99865"]
 OPERATORS = {"|": lambda a, b: a or b, "&": lambda a, b: a and b, "-": lambda a, b: a and not b,
@@ -118,7 +114,7 @@ def make_point(rng, result, box):
     return [rng.uniform(l, h) for l, h in box]
 
 
-def run_case(rng, number, folder):
+def run_case(ebpo, models, rng, number, folder):
     names = [rng.choice(MODELS), rng.choice(MODELS)]
     if rng.random() < 0.2:
         names[1] = names[0]
@@ -128,8 +124,8 @@ def run_case(rng, number, folder):
     for k, name in enumerate(names):
         path = folder / f"{name}.ebpo.h5"
         if not path.exists():
-            subprocess.run([EBPO, "convert", "-q", str(FOLDER / f"{name}.ply"), str(path)], check=True)
-        vertices, faces = read_ply(FOLDER / f"{name}.ply")
+            subprocess.run([ebpo, "convert", "-q", str(models / f"{name}.ply"), str(path)], check=True)
+        vertices, faces = read_ply(models / f"{name}.ply")
         extent = max(max(v[i] for v in vertices) - min(v[i] for v in vertices) for i in range(3))
         rotation, scale = random_rotation(rng), rng.uniform(0.7, 1.3) / extent
         centre = pose([tuple(sum(v[i] for v in vertices) / len(vertices) for i in range(3))], rotation, scale,
@@ -146,7 +142,7 @@ def run_case(rng, number, folder):
         arguments += ["--pose", f"{'AB'[k]} " + " ".join(f"{x:.17g}" for x in numbers)]
         solids.append(Solid(pose(vertices, rotation, scale, shift), faces))
     out = folder / "out.ply"
-    command = [EBPO, "boolean", f"A {operator} B", *(str(folder / f"{n}.ebpo.h5") for n in names), *arguments,
+    command = [ebpo, "boolean", f"A {operator} B", *(str(folder / f"{n}.ebpo.h5") for n in names), *arguments,
                "-o", str(out), *(["--double"] if doubles else []), *(["--memory", "128M"] if number % 4 == 3 else [])]
     done = subprocess.run(command, capture_output=True, text=True)
     label = f"case {number}: {names[0]} {operator} {names[1]}"
@@ -170,16 +166,20 @@ def run_case(rng, number, folder):
 
 
 def main():
-    rng, tested, failures = random.Random(SEED), 0, []
+    ebpo, models = sys.argv[1], pathlib.Path(sys.argv[2])
+    scale = float(os.environ.get("EBPO_TEST_SCALE", 1))
+    cases = int(sys.argv[3]) if len(sys.argv) > 3 else max(2, round(40 * scale))
+    rng, tested, failures = random.Random(int(sys.argv[4]) if len(sys.argv) > 4 else 1), 0, []
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(CASES):
-            failure, points = run_case(rng, number, pathlib.Path(folder))
+        for number in range(cases):
+            failure, points = run_case(ebpo, models, rng, number, pathlib.Path(folder))
             tested += points
             if failure:
                 failures.append(failure)
                 print(failure, flush=True)
-    print(f"{CASES} results, {tested} points, {len(failures)} failures")
-    return 1 if failures or tested < 10 * CASES else 0
+    print(f"{cases} results, {tested} points, {len(failures)} failures")
+    return 1 if failures or tested < 10 * cases else 0
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

@@ -271,6 +271,14 @@ class Parts(Case):
         self.assertEqual(scene.pose("there")[0, 3], 1)
         self.assertTrue(scene.box()[1, 0] > 9)
         self.assertEqual(len(scene.pairs()), 1)
+        both = ebpo.boolean("A | B | C", [scene], volume=True).volume[0]
+        self.assertLess(both, 3 * model("scan").volume)
+        self.assertEqual(both, ebpo.boolean("B | C | D", [model("scan"), scene], volume=True,
+                                            poses=[None, None, None, None], time=7).volume[0])
+        moved = ebpo.boolean("B - C", [scene, model("scan")], poses=[None, ebpo.pose(translation=[5, 0, 0]), None, None])
+        self.assertGreater(moved.vertices[:, 0].min(), 3)
+        with self.assertRaisesRegex(ValueError, "3 models, but 1 poses"):
+            ebpo.boolean("A", [scene], poses=[None])
         with self.assertRaises(ebpo.FormatError):
             pathlib.Path("bad.scene.json").write_text("{}")
             ebpo.open_scene("bad.scene.json")

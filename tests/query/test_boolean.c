@@ -353,6 +353,64 @@ START_TEST(test_boolean_invalid_expression_is_refused)
 }
 END_TEST
 
+/* Reads a scene with two instances of the model: the first one is at rest, and the second one moves
+ * by 4 along x within a second. */
+static ebpo_scene *make_scene(const operand *o)
+{
+    static const char text[] =
+        "{\"ebpo_scene\": \"1.0\", \"models\": {\"m\": {\"file\": \"model.ebpo.h5\"}}, \"routes\": "
+        "{\"r\": {\"poses\": [{}, {\"translation\": [4, 0, 0]}], \"step\": 1}}, \"instances\": "
+        "[{\"name\": \"a\", \"model\": \"m\"}, {\"name\": \"b\", \"model\": \"m\", \"route\": "
+        "\"r\"}]}";
+    ebpo_scene *scene = NULL;
+    ASSERT_OK(
+        ebpo_scene_parse(text, sizeof text - 1, "scene", o->model.folder, NULL, &scene, error));
+    return scene;
+}
+
+START_TEST(test_boolean_of_instances_of_scene)
+{
+    operand o;
+    uint32_t count = 0;
+    ebpo_boolean_operand got[2];
+    ebpo_boolean *boolean = NULL;
+    ebpo_exact_volume volume = EBPO_EXACT_VOLUME_INIT;
+    ebpo_load_options cut = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_error error_of_call = EBPO_ERROR_INIT;
+    ebpo_pose pose = shifted(0, 0, 0);
+    operand_make(&o, "sphere", 0, &pose);
+    ebpo_scene *scene = make_scene(&o), *in_parts = make_scene(&o);
+    ck_assert_int_eq(ebpo_boolean_get_operands(scene, 0.75, got, 2, &count, &error_of_call),
+                     EBPO_E_ARGUMENT);
+    ASSERT_OK(ebpo_scene_load(scene, NULL, error));
+    ck_assert_int_eq(ebpo_boolean_get_operands(scene, 0.75, got, 1, &count, &error_of_call),
+                     EBPO_E_LIMIT);
+    ck_assert_uint_eq(count, 2);
+    ck_assert_int_eq(ebpo_boolean_get_operands(scene, NAN, got, 2, &count, &error_of_call),
+                     EBPO_E_ARGUMENT);
+    ASSERT_OK(ebpo_boolean_get_operands(scene, 0.75, got, 2, &count, error));
+    ck_assert_ptr_eq(got[0].model, got[1].model);
+    ck_assert_double_eq(got[0].pose.translation[0], 0);
+    ck_assert_double_eq(got[1].pose.translation[0], 3);
+    ASSERT_OK(ebpo_boolean_new(got, 2, formulas[1].node, formulas[1].count, NULL, &boolean, error));
+    ASSERT_OK(ebpo_boolean_exact_volume(boolean, NULL, &volume, error));
+    ck_assert_int_eq(volume.doubt, EBPO_VOLUME_CERTAIN);
+    ck_assert_double_eq_tol(volume.volume.lo, 2 * o.model.info.report.volume, 1e-9);
+    ebpo_boolean_free(boolean);
+    ebpo_scene_free(scene);
+    /* With a cut level, the scene's models are only partly in memory. */
+    cut.cut_level = 1;
+    ASSERT_OK(ebpo_scene_load(in_parts, &cut, error));
+    ASSERT_OK(ebpo_boolean_get_operands(in_parts, 0.75, got, 2, &count, error));
+    ASSERT_OK(ebpo_boolean_new(got, 2, formulas[1].node, formulas[1].count, NULL, &boolean, error));
+    ASSERT_OK(ebpo_boolean_exact_volume(boolean, NULL, &volume, error));
+    ck_assert_int_eq(volume.doubt, EBPO_VOLUME_IN_PARTS);
+    ebpo_boolean_free(boolean);
+    ebpo_scene_free(in_parts);
+    operand_free(&o);
+}
+END_TEST
+
 TEST_SUITE(boolean)
 {
     Suite *s = suite_create("boolean");
@@ -363,6 +421,7 @@ TEST_SUITE(boolean)
     tcase_add_test(c, test_boolean_of_equal_and_nearly_equal);
     tcase_add_test(c, test_boolean_far_from_origin);
     tcase_add_test(c, test_boolean_invalid_expression_is_refused);
+    tcase_add_test(c, test_boolean_of_instances_of_scene);
     suite_add_tcase(s, c);
     return s;
 }

@@ -11,6 +11,7 @@
 #include <ebpo/boolean.h>
 
 #include "check_main.h"
+#include "extras/boolean/base_faces.h"
 #include "geometry/predicates.h"
 #include "mesh/attributes.h"
 #include "query_support.h"
@@ -661,6 +662,21 @@ static uint64_t list_changed(const scene *s, const ebpo_mesh *changes, corners *
     return count;
 }
 
+/* Makes a sphere with many faces and a long diagonal drill through it. The drill's box contains all
+ * faces of the sphere. */
+static void make_drilled_sphere(scene *s)
+{
+    const double centre[3] = { 0, 0, 0 }, low[3] = { -4, -0.02, -0.02 },
+                 high[3] = { 4, 0.02, 0.02 };
+    static const double turn[3][3] = { { 0.36, 0.48, -0.8 },
+                                       { -0.8, 0.6, 0 },
+                                       { 0.48, 0.64, 0.6 } };
+    ebpo_pose pose = moved_pose(0, 0, 0);
+    memcpy(pose.rotation, turn, sizeof turn);
+    add_operand(s, ebpo_test_sphere(centre, 1, 5), moved_pose(0.25, 0, 0), 3);
+    add_operand(s, ebpo_test_box(low, high, 2), pose, 3);
+}
+
 /* The faces that stay and the changes are the faces of the result. */
 START_TEST(changes)
 {
@@ -669,15 +685,19 @@ START_TEST(changes)
                                           EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE };
     const double centre[3] = { 0, 0, 0 };
     uint64_t kept = 0, compared = 0;
-    for (uint32_t i = 0; i < 40; i++) {
+    for (uint32_t i = 0; i < 44; i++) {
         uint64_t state = i + 1;
         double small[3] = { 0.1, 0.2, 0.3 };
         ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
         ebpo_boolean_mesh_report report = EBPO_BOOLEAN_MESH_REPORT_INIT;
         ebpo_mesh whole, mesh;
         scene s = { .nodes = 0 };
-        add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0.25 * (i % 3), 0, 0), 3 * i);
-        if (i % 5 == 0)
+        if (i < 40)
+            add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0.25 * (i % 3), 0, 0),
+                        3 * i);
+        if (i >= 40)
+            make_drilled_sphere(&s);
+        else if (i % 5 == 0)
             add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0, 0, 0), 3);
         else
             add_operand(&s, ebpo_test_sphere(small, 0.3, 1), turned_pose(&state), 3);
@@ -708,6 +728,28 @@ START_TEST(changes)
         free_scene(&s);
     }
     ck_assert_uint_gt(3 * kept, compared);
+}
+END_TEST
+
+/* Few faces of the sphere are listed. */
+START_TEST(few_faces_near_drill)
+{
+    scene s = { .nodes = 3,
+                .node = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                          { EBPO_BOOLEAN_OPERAND, 1, 0, 0 },
+                          { EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 } } };
+    ebpo_base_face *near;
+    uint64_t count;
+    make_drilled_sphere(&s);
+    ebpo_boolean *boolean = make_boolean(&s, 1);
+    ASSERT_OK(ebpo_base_faces_find(boolean, &near, &count, error));
+    ck_assert_uint_gt(count, 0);
+    ck_assert_uint_lt(count, s.model[0].mesh.face_count / 2);
+    for (uint64_t i = 1; i < count; i++)
+        ck_assert_uint_lt(near[i - 1].file_face, near[i].file_face);
+    free(near);
+    ebpo_boolean_free(boolean);
+    free_scene(&s);
 }
 END_TEST
 
@@ -784,6 +826,7 @@ TEST_SUITE(boolean_mesh)
     tcase_add_test(tests, regions);
     tcase_add_test(tests, refused_regions);
     tcase_add_test(tests, changes);
+    tcase_add_test(tests, few_faces_near_drill);
     tcase_add_test(tests, refused_changes);
     tcase_add_test(tests, equal_for_any_threads);
     suite_add_tcase(suite, tests);

@@ -654,12 +654,16 @@ static ebpo_status call_scene(every_call_env *e)
 static ebpo_status call_scene_file(every_call_env *e)
 {
     ebpo_scene *scene = NULL;
+    ebpo_boolean_operand operand;
+    uint32_t operands;
     ebpo_status status =
         ebpo_write_file(scratch("s.json"), scene_text, sizeof scene_text - 1, e->error);
     if (status == EBPO_OK)
         status = ebpo_scene_open(scratch("s.json"), NULL, &scene, e->error);
     if (status == EBPO_OK)
         status = ebpo_scene_load(scene, NULL, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_boolean_get_operands(scene, 0, &operand, 1, &operands, e->error);
     if (status == EBPO_OK)
         status = pack_scene(scene, e->error);
     ebpo_scene_free(scene);

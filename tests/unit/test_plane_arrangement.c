@@ -228,12 +228,31 @@ START_TEST(random_segments)
 }
 END_TEST
 
+/* Faces around a common vertex add it many times. Comparing all pairs of these points would take
+ * minutes. */
+START_TEST(repeated_points)
+{
+    ebpo_arrangement_2d a;
+    ebpo_arrangement_2d_init(&a);
+    ebpo_arrangement_2d_begin(&a, 2, -60);
+    uint32_t apex = add_exact(&a, (fraction_point){ 0, 0, 1 }),
+             end = add_exact(&a, (fraction_point){ 2, 0, 1 });
+    for (int i = 0; i < 200000; i++)
+        ck_assert(ebpo_arrangement_2d_add(&a, apex, i % 1000 ? apex : end));
+    ck_assert(ebpo_arrangement_2d_divide(&a));
+    ck_assert_uint_eq(a.segments, 2);
+    ck_assert_uint_eq(a.edges, 1);
+    ebpo_arrangement_2d_free(&a);
+}
+END_TEST
+
 TEST_SUITE(plane_arrangement)
 {
     Suite *suite = suite_create("plane_arrangement");
     TCase *tests = tcase_create("plane_arrangement");
     tcase_set_timeout(tests, 0);
     tcase_add_test(tests, random_segments);
+    tcase_add_test(tests, repeated_points);
     suite_add_tcase(suite, tests);
     return suite;
 }

@@ -282,12 +282,12 @@ static arg_result add_output(const parser *p, const char **operands, int *count)
 }
 
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
-                      const char *operands[ARGS_OPERANDS_MAX])
+                      const char *operands[ARGS_OPERANDS_MAX + 1])
 {
     parser p = { .spec = spec, .argc = argc, .at = 1, .argv = argv, .values = values };
     int count = 0;
     bool options = true;
-    memset(operands, 0, ARGS_OPERANDS_MAX * sizeof *operands);
+    memset(operands, 0, (ARGS_OPERANDS_MAX + 1) * sizeof *operands);
     for (; p.at < argc; p.at++) {
         const char *a = argv[p.at];
         arg_result result = ARGS_RUN;

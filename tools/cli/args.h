@@ -69,13 +69,14 @@ typedef enum arg_result {
     ARGS_WRONG   /* an error was printed */
 } arg_result;
 
-enum { ARGS_OPERANDS_MAX = 12 };
+/* Maximum number of operands: an expression and the models A to Z. */
+enum { ARGS_OPERANDS_MAX = 27 };
 
 /* Parses argv[1], argv[2], ... Options may be anywhere; all arguments after "--" are operands.
  * Prints --help on stdout, errors on stderr. `values`: the command's struct of values, which has
- * the defaults. `operands`: receives the operands; unused entries become NULL. */
+ * the defaults. `operands`: receives the operands, and NULL in all entries after them. */
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
-                      const char *operands[ARGS_OPERANDS_MAX]);
+                      const char *operands[ARGS_OPERANDS_MAX + 1]);
 
 /* Prints the text of --help. */
 void args_help(const arg_spec *spec);

@@ -1,5 +1,7 @@
 #include "cli/boolean_operands.h"
 
+#include <limits.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "cli/command.h"
@@ -66,16 +68,19 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
                       const ebpo_model_options *model_options, const remote_values *remote)
 {
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
+    ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     ebpo_error error = EBPO_ERROR_INIT;
-    load.memory = model_options->memory * in->count;
+    uint32_t count = 0;
+    /* raises_memory: the least memory of the models is not known before they are open */
+    load.memory = model_options->memory * in->count * (o->raises_memory ? 16 : 1);
+    load.cut_level = model_options->cut_level;
+    load.threads = model_options->threads;
     load.max_expansion = (uint64_t)remote->max_expansion;
     ebpo_status status = ebpo_scene_load(in->scene, &load, &error);
-    for (uint32_t i = 0; i < in->count && status == EBPO_OK; i++) {
-        ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
-        (void)ebpo_scene_get_instance(in->scene, i, &instance);
-        status =
-            ebpo_scene_model(in->scene, instance.model, &o->operand[in->first + i].model, &error);
-    }
+    if (status == EBPO_OK)
+        status = ebpo_boolean_get_operands(in->scene, 0, operand, BOOLEAN_OPERANDS, &count, &error);
+    for (uint32_t i = 0; i < count && status == EBPO_OK; i++)
+        o->operand[in->first + i].model = operand[i].model; /* poses may be those of --pose */
     return status == EBPO_OK ? EXIT_OK : command_failed(name, &error);
 }
 
@@ -85,9 +90,16 @@ static int open_model(boolean_operands *o, const char *name, boolean_input *in,
                       const ebpo_model_options *model_options, const remote_values *remote)
 {
     const ebpo_model_options any_level = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_options options = *model_options;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    ebpo_error error = EBPO_ERROR_INIT;
     int code = query_open_file(&in->session, name, in->path, &any_level, -1, remote);
+    if (code == EXIT_OK && o->raises_memory &&
+        ebpo_model_memory(in->session.file, &any_level, &plan, &error) == EBPO_OK &&
+        options.memory < 2 * plan.least)
+        options.memory = 2 * plan.least;
     if (code == EXIT_OK)
-        code = query_open_model(&in->session, name, model_options);
+        code = query_open_model(&in->session, name, &options);
     o->operand[in->first].model = in->session.model;
     return code;
 }
@@ -112,23 +124,55 @@ void boolean_operands_close(boolean_operands *o)
     }
 }
 
-static const char *unit_of(const ebpo_file *file)
+/* Returns the open file of an operand of an input. */
+static const ebpo_file *file_of(const boolean_input *in, uint32_t operand)
 {
-    return file && ebpo_file_info(file)->unit[0] ? ebpo_file_info(file)->unit : NULL;
+    ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
+    if (!in->scene)
+        return in->session.file;
+    (void)ebpo_scene_get_instance(in->scene, operand - in->first, &instance);
+    return ebpo_scene_file(in->scene, instance.model);
 }
 
-const char *boolean_operands_unit(const boolean_operands *o)
+const char *boolean_operands_unit(const boolean_operands *o, const boolean_nodes *nodes)
 {
-    for (uint32_t i = 0; i < o->inputs; i++) {
-        const boolean_input *in = &o->input[i];
-        const char *unit = unit_of(in->session.file);
-        for (uint32_t k = 0; k < in->count && in->scene && !unit; k++) {
-            ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
-            (void)ebpo_scene_get_instance(in->scene, k, &instance);
-            unit = unit_of(ebpo_scene_file(in->scene, instance.model));
-        }
-        if (unit)
-            return unit;
+    const char *unit = "";
+    for (uint32_t n = 0; n < nodes->count && !unit[0]; n++) {
+        const boolean_input *in = o->input;
+        uint32_t operand = nodes->node[n].left;
+        if (nodes->node[n].operation != EBPO_BOOLEAN_OPERAND)
+            continue;
+        while (operand >= in->first + in->count)
+            in++;
+        unit = ebpo_file_info(file_of(in, operand))->unit;
     }
-    return NULL;
+    return unit[0] ? unit : NULL;
+}
+
+/* Returns true, after an error message, if a model of the scene is the output file. */
+static bool overwrites_model(const boolean_input *in, const char *name, const char *out)
+{
+    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
+    const char *slash = strrchr(in->path, '/');
+    int folder = slash ? (int)(slash + 1 - in->path) : 0; /* length of the scene's folder */
+    char path[PATH_MAX];
+    (void)ebpo_scene_get_counts(in->scene, &counts);
+    for (uint64_t i = 0; i < counts.models; i++) {
+        ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
+        (void)ebpo_scene_get_model_facts(in->scene, i, &facts);
+        snprintf(path, sizeof path, "%.*s%s", facts.path[0] == '/' ? 0 : folder, in->path,
+                 facts.path);
+        if (command_overwrites(name, path, out))
+            return true;
+    }
+    return false;
+}
+
+bool boolean_operands_overwrite(const boolean_operands *o, const char *name, const char *out)
+{
+    for (uint32_t i = 0; i < o->inputs; i++)
+        if (command_overwrites(name, o->input[i].path, out) ||
+            (o->input[i].scene && overwrites_model(&o->input[i], name, out)))
+            return true;
+    return false;
 }

@@ -5,6 +5,7 @@
 #include <ebpo/boolean.h>
 #include <ebpo/scene.h>
 
+#include "cli/boolean_args.h"
 #include "cli/query_args.h"
 
 /* Maximum number of operands: one for each letter. */
@@ -24,6 +25,7 @@ typedef struct boolean_operands {
     ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
     uint32_t count;                      /* number of operands */
+    bool raises_memory; /* large models may use more memory than model_options.memory */
 } boolean_operands;
 
 /* Lists the operands in the order of the paths, which end with NULL. A path is a model, or a scene
@@ -37,7 +39,12 @@ int boolean_operands_open(boolean_operands *o, const char *name,
                           const ebpo_model_options *model_options, const remote_values *remote);
 void boolean_operands_close(boolean_operands *o);
 
-/* Returns the unit of the first operand that has a unit, or NULL. */
-const char *boolean_operands_unit(const boolean_operands *o);
+/* Returns the unit of the first operand of an expression that has a unit, or NULL. The models are
+ * open. */
+const char *boolean_operands_unit(const boolean_operands *o, const boolean_nodes *nodes);
+
+/* Returns true, after an error message, if the output is a file of the operands: a model, a scene,
+ * or a model of a scene. The caller then exits with EXIT_USAGE. */
+bool boolean_operands_overwrite(const boolean_operands *o, const char *name, const char *out);
 
 #endif

@@ -10,9 +10,9 @@ typedef struct ebpo_base_face {
     double corner[3][3]; /* posed */
 } ebpo_base_face;
 
-/* Finds the faces of operand 0 that intersect a box around all other operands of the expression at
- * their poses. *out is in the order of the file. Reads only the subtrees that intersect the box.
- * The caller frees *out, also after a failure. */
+/* Finds the faces of operand 0 that may not be outside all other operands of the expression at
+ * their poses, and some faces near them. *out is in the order of the file. Reads only the subtrees
+ * near the other operands. The caller frees *out, also after a failure. */
 EBPO_MUST_USE ebpo_status ebpo_base_faces_find(const ebpo_boolean *b, ebpo_base_face **out,
                                                uint64_t *count, ebpo_error *error);
 

@@ -258,6 +258,30 @@ static ebpo_status add_half_spaces(ebpo_boolean *b, const ebpo_boolean_options *
     return status;
 }
 
+/* Fails if two operands have different units. Units are texts that the user chose. An operand
+ * without a unit may be combined with every unit. */
+static ebpo_status check_units(const ebpo_boolean *b, ebpo_error *error)
+{
+    const char *unit = "";
+    uint64_t used = ebpo_expression_operands(&b->expression);
+    for (uint32_t i = 0; i < b->count; i++) {
+        const ebpo_model *model = b->solid[i].model;
+        const char *own = model->info->unit;
+        ebpo_error cause = EBPO_ERROR_INIT;
+        if (!(used >> i & 1) || !own[0])
+            continue;
+        if (unit[0] && strcmp(unit, own) != 0) {
+            ebpo_fail(&cause, EBPO_E_ARGUMENT,
+                      "the unit is %s, but another operand has the unit %s; convert a model again "
+                      "with the same unit",
+                      own, unit);
+            return ebpo_fail_operand(model, i, &cause, error);
+        }
+        unit = own;
+    }
+    return EBPO_OK;
+}
+
 static ebpo_status make_contexts(ebpo_boolean *b, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
@@ -284,6 +308,8 @@ static ebpo_status fill_operands(ebpo_boolean *b, const ebpo_boolean_operand *op
     }
     if (status == EBPO_OK)
         status = add_half_spaces(b, options, error);
+    if (status == EBPO_OK)
+        status = check_units(b, error);
     return status == EBPO_OK ? make_contexts(b, error) : status;
 }
 

@@ -28,30 +28,6 @@ static ebpo_status make_mesh(ebpo_face_list *faces, const ebpo_boolean_mesh_opti
     return status;
 }
 
-/* Fails if two operands have different units. Units are texts that the user chose. An operand
- * without a unit may be combined with every unit. */
-static ebpo_status check_units(const ebpo_boolean *b, ebpo_error *error)
-{
-    const char *unit = "";
-    uint64_t used = ebpo_expression_operands(&b->expression);
-    for (uint32_t i = 0; i < b->count; i++) {
-        const ebpo_model *model = b->solid[i].model;
-        const char *own = model->info->unit;
-        ebpo_error cause = EBPO_ERROR_INIT;
-        if (!(used >> i & 1) || !own[0])
-            continue;
-        if (unit[0] && strcmp(unit, own) != 0) {
-            ebpo_fail(&cause, EBPO_E_ARGUMENT,
-                      "the unit is %s, but another operand has the unit %s; convert a model again "
-                      "with the same unit",
-                      own, unit);
-            return ebpo_fail_operand(model, i, &cause, error);
-        }
-        unit = own;
-    }
-    return EBPO_OK;
-}
-
 ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean, const ebpo_boolean_mesh_options *options,
                               ebpo_mesh *out, ebpo_boolean_mesh_report *report, ebpo_error *error)
 {
@@ -64,8 +40,6 @@ ebpo_status ebpo_boolean_mesh(ebpo_boolean *boolean, const ebpo_boolean_mesh_opt
     if (status == EBPO_OK && checked.changed_only && (checked.volume || checked.attributes))
         status = ebpo_fail(error, EBPO_E_ARGUMENT,
                            "changed_only cannot be used with volume or attributes");
-    if (status == EBPO_OK)
-        status = check_units(boolean, error);
     if (status != EBPO_OK)
         return status;
     status = ebpo_face_list_make(&faces, boolean, checked.changed_only, checked.workspace,

@@ -166,9 +166,8 @@ static ebpo_status list_base(ebpo_face_list *faces, ebpo_error *error)
     const ebpo_boolean *b = faces->boolean;
     ebpo_base_face *near;
     uint64_t count;
-    ebpo_error cause = EBPO_ERROR_INIT;
     faces->keeps_base = ebpo_boolean_holds(b, faces->equal[0]);
-    ebpo_status status = ebpo_base_faces_find(b, &near, &count, &cause);
+    ebpo_status status = ebpo_base_faces_find(b, &near, &count, error);
     if (status == EBPO_OK) {
         faces->base_source = ebpo_alloc(count, sizeof *faces->base_source);
         bool listed_all = faces->base_source != NULL;
@@ -177,10 +176,10 @@ static ebpo_status list_base(ebpo_face_list *faces, ebpo_error *error)
             listed_all = list_face(faces, (const double(*)[3])near[i].corner, near[i].file_face);
         }
         if (!listed_all)
-            status = ebpo_fail_memory(&cause, count * sizeof *near);
+            status = ebpo_fail_memory(error, count * sizeof *near);
     }
     free(near);
-    return status == EBPO_OK ? EBPO_OK : ebpo_fail_operand(b->solid[0].model, 0, &cause, error);
+    return status;
 }
 
 static ebpo_status read_operands(ebpo_face_list *faces, const ebpo_progress *progress,

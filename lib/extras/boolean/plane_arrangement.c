@@ -128,9 +128,22 @@ static bool compare_segments(ebpo_arrangement_2d *a, uint64_t i, uint64_t j)
            (to_s != 0 || record_if_inside(a, j, s.to));
 }
 
+/* Sorts the segments, and keeps one of several equal segments. Each face around a vertex adds the
+ * vertex as a single point to the faces of another operand that have the same vertex. */
+static void sort_segments(ebpo_arrangement_2d *a)
+{
+    uint64_t kept = 0;
+    qsort(a->segment, a->segments, sizeof *a->segment, order_segments);
+    for (uint64_t i = 0; i < a->segments; i++)
+        if (kept == 0 || a->segment[kept - 1].from != a->segment[i].from ||
+            a->segment[kept - 1].to != a->segment[i].to)
+            a->segment[kept++] = a->segment[i];
+    a->segments = kept;
+}
+
 static bool compare_all(ebpo_arrangement_2d *a)
 {
-    qsort(a->segment, a->segments, sizeof *a->segment, order_segments);
+    sort_segments(a);
     for (uint64_t i = 0; i < a->segments; i++)
         for (uint64_t j = i + 1; j < a->segments && a->segment[j].low[0] <= a->segment[i].high[0];
              j++)

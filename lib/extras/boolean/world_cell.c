@@ -111,13 +111,9 @@ static ebpo_status inspect_faces(ebpo_context *context, const double p[3], doubl
     return status;
 }
 
-/* Decides if a cube of the world is inside or outside a posed solid. The cube is parallel to the
- * axes; half: half of the cube's edge. *may: EBPO_MAY_IN if the whole closed cube is inside,
- * EBPO_MAY_OUT if it is outside, EBPO_MAY_BOTH if a face may be in the ball around the cube.
- * *stage: the test that has decided (EBPO_CUBE_...). */
-static ebpo_status solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
-                                 const double centre[3], double half, unsigned *may,
-                                 unsigned *stage, ebpo_error *error)
+ebpo_status ebpo_solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
+                               const double centre[3], double half, unsigned *may, unsigned *stage,
+                               ebpo_error *error)
 {
     double p[3], doubt;
     *stage = EBPO_CUBE_BY_BOX;
@@ -194,8 +190,8 @@ ebpo_status ebpo_world_cell_query(const ebpo_boolean *b, unsigned worker, const 
         unsigned operand, stage;
         if (c->known >> i & 1)
             continue;
-        ebpo_status status = solid_in_cube(&b->solid[i], ebpo_boolean_context(b, worker, i), centre,
-                                           half, &operand, &stage, error);
+        ebpo_status status = ebpo_solid_in_cube(&b->solid[i], ebpo_boolean_context(b, worker, i),
+                                                centre, half, &operand, &stage, error);
         if (status != EBPO_OK)
             return status;
         stages[stage]++;

@@ -11,6 +11,14 @@
  * of its tree, or its faces. */
 enum { EBPO_CUBE_BY_BOX, EBPO_CUBE_BY_NODES, EBPO_CUBE_BY_FACES, EBPO_CUBE_STAGES };
 
+/* Decides if a cube of the world is inside or outside a posed solid. The cube is parallel to the
+ * axes; half: half of the cube's edge. *may: EBPO_MAY_IN if the whole closed cube is inside,
+ * EBPO_MAY_OUT if it is outside, EBPO_MAY_BOTH if a face may be in the ball around the cube.
+ * *stage: the test that has decided. */
+EBPO_MUST_USE ebpo_status ebpo_solid_in_cube(const ebpo_posed_solid *s, ebpo_context *context,
+                                             const double centre[3], double half, unsigned *may,
+                                             unsigned *stage, ebpo_error *error);
+
 /* The root cell of the octree, a cube around the result. */
 typedef struct ebpo_world {
     double origin[3]; /* lower corner */

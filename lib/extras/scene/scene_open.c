@@ -230,6 +230,10 @@ ebpo_status ebpo_scene_load(ebpo_scene *scene, const ebpo_load_options *options,
     ebpo_status status = EBPO_TAKE(ebpo_load_options, &checked, options, error);
     if (status == EBPO_OK && checked.memory && !scene->model_options.budget)
         status = ebpo_budget_new(checked.memory, &scene->model_options.budget, error);
+    if (status == EBPO_OK) {
+        scene->model_options.cut_level = checked.cut_level;
+        scene->model_options.threads = checked.threads;
+    }
     if (status == EBPO_OK && !ebpo_progress_stage(&checked.progress, "opening models", error))
         status = EBPO_E_CANCELLED;
     for (uint64_t i = 0; i < scene->models_count && status == EBPO_OK; i++) {

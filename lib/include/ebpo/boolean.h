@@ -2,7 +2,7 @@
  * Evaluates queries of unions, intersections and differences of solids. Each solid is a model at a
  * pose.
  *
- *   Expressions     ebpo_boolean_new
+ *   Expressions     ebpo_boolean_new, ebpo_boolean_get_operands (instances of a scene)
  *   Point in solid  ebpo_boolean_inside, ebpo_boolean_inside_many
  *   Distance        ebpo_boolean_distance
  *   Exact volume    ebpo_boolean_exact_volume
@@ -23,6 +23,7 @@
 
 #include <ebpo/collide.h>
 #include <ebpo/pose.h>
+#include <ebpo/scene.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -102,10 +103,12 @@ typedef struct ebpo_boolean ebpo_boolean;
  * outlive the expression.
  *
  * EBPO_E_ARGUMENT: an index is out of range; a node refers to itself or to a later node; an
- * operation, box, plane or pose (ebpo_pose_check) is not valid; or there is a complement, but no
- * box. EBPO_E_LIMIT: there are no operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a
- * surface. EBPO_E_ABSENT: an operand's file has no mesh. EBPO_E_IO: `temp_dir` cannot hold files.
- * Messages give the index of the node, or the number of the operand (from 1 on) and its file.
+ * operation, box, plane or pose (ebpo_pose_check) is not valid; there is a complement, but no box;
+ * or operands that the expression uses have different units (an operand without a unit may be
+ * combined with every unit). EBPO_E_LIMIT: there are no operands or nodes, or too many.
+ * EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no mesh.
+ * EBPO_E_IO: `temp_dir` cannot hold files. Messages give the index of the node, or the number of
+ * the operand (from 1 on) and its file.
  *
  * Threads: any.
  */
@@ -115,6 +118,28 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_new(const ebpo_boolean_operand *
                                                     uint32_t node_count,
                                                     const ebpo_boolean_options *options,
                                                     ebpo_boolean **out, ebpo_error *error);
+
+/*
+ * Gets the instances of a scene as operands for ebpo_boolean_new: operand i is the model of
+ * instance i (ebpo_scene_model) at the instance's pose at a time (ebpo_scene_pose). The scene owns
+ * the models, so it must outlive the expressions of these operands.
+ *
+ * scene      loaded (ebpo_scene_load)
+ * time       in seconds; any finite time
+ * operands   receives an operand for each instance; may be NULL if `capacity` is 0
+ * capacity   length of `operands`
+ * count      receives the number of instances, also if EBPO_E_LIMIT is returned
+ *
+ * EBPO_E_LIMIT: there are more than `capacity` instances. EBPO_E_ARGUMENT: a model is not loaded,
+ * or the time is not finite. Also the errors of ebpo_model_new. On failure `operands` are
+ * unspecified.
+ *
+ * Threads: one at a time per scene.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_boolean_get_operands(ebpo_scene *scene, double time,
+                                                             ebpo_boolean_operand *operands,
+                                                             uint32_t capacity, uint32_t *count,
+                                                             ebpo_error *error);
 
 /*
  * Frees an expression. Free its models only after this call.
@@ -345,8 +370,8 @@ typedef struct ebpo_boolean_mesh_options {
      * that are not faces of the result. Indices are indices in the file of operand 0.
      * ebpo_mesh_write_ply writes `removed` as an element. The mesh and the faces of operand 0
      * outside these ranges together are the result. Self-intersections of operand 0 are not cut, so
-     * faces that stay may intersect each other. Only the part of operand 0 in the box of the other
-     * operands is read, and its faces must fit in memory. `volume` and `attributes` must be false.
+     * faces that stay may intersect each other. Only the part of operand 0 near the other operands
+     * is read, and its faces must fit in memory. `volume` and `attributes` must be false.
      */
     bool changed_only;
 
@@ -438,8 +463,8 @@ typedef struct ebpo_boolean_mesh_report {
  * out     freed by ebpo_mesh_free; without faces if the result is empty
  * report  may be NULL
  *
- * EBPO_E_ARGUMENT: operands have different units. Also if `changed_only` is true and one of these
- * conditions is met: the expression does not use operand 0; `volume` is true; `attributes` is true.
+ * EBPO_E_ARGUMENT: `changed_only` is true, and one of these conditions is met: the expression does
+ * not use operand 0; `volume` is true; `attributes` is true.
  * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices.
  * EBPO_E_FORMAT: an operand is not closed, although its file says that it is a solid.
  * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 is cut or reversed where its faces

@@ -365,9 +365,16 @@ typedef struct ebpo_load_options {
 
     /* As in ebpo_open_options. */
     uint64_t max_expansion;
+
+    /* As in ebpo_model_options, for all models that ebpo_scene_model makes after this call. */
+    int cut_level;
+    unsigned threads;
 } ebpo_load_options;
 
-#define EBPO_LOAD_OPTIONS_INIT EBPO_SIZED(ebpo_load_options)
+#define EBPO_LOAD_OPTIONS_INIT                                 \
+    {                                                          \
+        sizeof(ebpo_load_options), 0, { NULL, NULL }, 0, -1, 0 \
+    }
 
 /*
  * Opens the files of models that are not open yet. A path that several models share is opened once.

@@ -361,15 +361,15 @@ static ebpo_status compute_cells(cell_result *a, ebpo_boolean *b, ebpo_progress 
     return status;
 }
 
-static int make_cells(const values *v, const boolean_operands *operands, ebpo_workspace *workspace,
-                      ebpo_boolean *b)
+static int make_cells(const values *v, const boolean_nodes *nodes, const boolean_operands *operands,
+                      ebpo_workspace *workspace, ebpo_boolean *b)
 {
     progress_line line;
     ebpo_error error = EBPO_ERROR_INIT;
     cell_result a = { .v = v,
                       .operands = operands,
                       .output = { .path = v->out,
-                                  .unit = boolean_operands_unit(operands),
+                                  .unit = boolean_operands_unit(operands, nodes),
                                   .threads = (unsigned)v->query.threads,
                                   .doubles = v->doubles,
                                   .volume = v->volume,
@@ -424,14 +424,7 @@ static int check_values(const values *v, const boolean_operands *operands)
                              "--output '%s': expected a name that ends with .ply or "
                              ".ebpo.h5",
                              v->out);
-    for (uint32_t i = 0; i < operands->inputs; i++) {
-        const boolean_input *in = &operands->input[i];
-        if (v->out && command_overwrites("boolean", in->path, v->out))
-            return EXIT_USAGE;
-        if (in->scene && v->query.cut_level >= 0)
-            return command_usage("boolean", "--cut-level does not apply to scenes");
-    }
-    return EXIT_OK;
+    return v->out && boolean_operands_overwrite(operands, "boolean", v->out) ? EXIT_USAGE : EXIT_OK;
 }
 
 /* Reads the box and the planes to which the result is cut. */
@@ -461,11 +454,14 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
     if (ebpo_boolean_new(operands->operand, operands->count, nodes->node, nodes->count,
                          boolean_options, &b, &error) != EBPO_OK)
         return command_failed("boolean", &error);
-    int code =
-        v->inside || v->distance ? query_points(v, b) : make_cells(v, operands, workspace, b);
+    int code = v->inside || v->distance ? query_points(v, b)
+                                        : make_cells(v, nodes, operands, workspace, b);
     ebpo_boolean_free(b);
     return code;
 }
+
+/* Memory in bytes that each model may use in any case. Budgets below 3 MiB are refused. */
+static const uint64_t least_memory = UINT64_C(4) << 20;
 
 /* If the exact result is written with --memory or --temp-dir, makes the workspace. With --memory,
  * sets the limit of each model; all models together may use a quarter of the memory. */
@@ -479,6 +475,8 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;
     model_options->memory /= 4 * count;
+    if (model_options->memory < least_memory)
+        model_options->memory = least_memory;
     return memory_new(out, &memory, &error) == EBPO_OK ? EXIT_OK
                                                        : command_failed("boolean", &error);
 }
@@ -486,8 +484,8 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
 static const values standard = { .query = QUERY_VALUES_INIT, .level = 6, .tolerance = 0.01 };
 
 /* Default memory in bytes for each model with --changed-only, which reads only a part of operand A.
- */
-static const uint64_t changes_memory = UINT64_C(256) << 20;
+ * Models that fit in this memory are read completely, so it is small. */
+static const uint64_t changes_memory = UINT64_C(16) << 20;
 
 /* Opens the models, and evaluates the expression. */
 static int run_expression(const values *v, const char *expression, boolean_operands *operands,
@@ -510,7 +508,9 @@ static int run_expression(const values *v, const char *expression, boolean_opera
     int code = check_values(v, operands);
     if (code == EXIT_OK)
         code = limit_memory(v, operands->count, &model_options, &workspace);
-    if (v->changed_only && model_options.memory == 0 && model_options.cut_level < 0)
+    operands->raises_memory =
+        v->changed_only && model_options.memory == 0 && model_options.cut_level < 0;
+    if (operands->raises_memory)
         model_options.memory = changes_memory;
     if (code == EXIT_OK)
         code = boolean_operands_open(operands, "boolean", &model_options, &v->query.remote);

@@ -11,8 +11,8 @@ typedef struct command {
     const arg_spec *spec;
     size_t size;          /* size of the struct `values` that spec->options fills */
     const void *standard; /* a struct of that type with the defaults */
-    /* values: the struct with defaults and given options; operand[ARGS_OPERANDS_MAX]: NULL for
-     * operands that were not given. Returns the exit code. */
+    /* values: the struct with defaults and given options; operand: the operands,
+     * then NULL. Returns the exit code. */
     int (*run)(void *values, const char **operand);
 } command;
 

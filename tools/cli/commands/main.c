@@ -159,7 +159,7 @@ static int run_with_stack(command_call *call)
 
 static int run_parsed(const command *c, int argc, char **argv)
 {
-    const char *operand[ARGS_OPERANDS_MAX];
+    const char *operand[ARGS_OPERANDS_MAX + 1];
     void *values = malloc(c->size);
     if (!values)
         return command_no_memory(c->spec->command);

@@ -11,7 +11,7 @@
 #include "cli/remote_args.h"
 
 enum {
-    METHODS_MAX = ARGS_OPERANDS_MAX,
+    METHODS_MAX = 12,
     METHOD_NOTES = 10, /* maximum number of notes of a method */
     SETTINGS_MAX = METHODS_MAX,
     DEADLINES = 8, /* number of measured deadlines */

@@ -70,6 +70,8 @@ static void write_method_name(const char *path, char *name, size_t capacity)
 static int add_file(comparison *c, const char *path)
 {
     char name[64];
+    if (c->count == METHODS_MAX)
+        return refuse_method("more than 12 files; give fewer files", path);
     if (c->count < c->v->names.count)
         snprintf(name, sizeof name, "%s", c->v->names.item[c->count]);
     else

@@ -14,6 +14,7 @@ from ._checked import path
 from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
 from .collide import pose_of
 from .parts import mesh_of
+from .scene import Scene
 from .signatures import ArrayLike, Path, Progress, Size, Uint32s, Vertices
 
 if TYPE_CHECKING:
@@ -84,15 +85,17 @@ class Parser:
         return self.nodes
 
 
-def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | ArrayLike | None] | None = None,
-            box: ArrayLike | None = None, planes: ArrayLike | None = None, doubles: bool = False,
-            volume: bool = False, memory: Size | None = None, temp_dir: Path | None = None,
+def boolean(expression: str, models: Sequence[Model | Scene], *, poses: Sequence[Pose | ArrayLike | None] | None = None,
+            time: float | None = None, box: ArrayLike | None = None, planes: ArrayLike | None = None,
+            doubles: bool = False, volume: bool = False, memory: Size | None = None, temp_dir: Path | None = None,
             threads: int | None = None, progress: Progress | None = None) -> Result:
     """Return the mesh of a Boolean expression of models at poses: closed, and cut exactly.
 
     expression: the models are A, B, ... in their order; | or + is the union, & or * the intersection, - the
         difference, ^ the symmetric difference, ~A the complement of A in the box.
-    poses: a pose for each model, as for `Collider`; None: as in the files.
+    models: a scene stands for its instances, a letter for each.
+    poses: a pose for each letter, as for `Collider`; None: as in the file of the model or of the scene.
+    time: time of scenes in seconds. None: the first time of each scene.
     box: (2, 3), low and high corner of a box to which the result is cut.
     planes: (n, 4) or (4,), rows of a, b, c, d: the result is cut to the points with ax + by + cz <= d.
     doubles: True: float64 coordinates; False: float32 if all models have float32.
@@ -106,17 +109,18 @@ def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | 
     >>> boolean("A", [cube], planes=[0, 0, 1, .25], volume=True).volume
     (0.25, 0.25)
     """
-    poses = [None] * len(models) if poses is None else poses
-    if len(poses) != len(models):
-        raise ValueError(f"{len(models)} models, but {len(poses)} poses")
+    given = [operand for item in models for operand in operands_of(item, time)]
+    poses = [None] * len(given) if poses is None else poses
+    if len(poses) != len(given):
+        raise ValueError(f"{len(given)} models, but {len(poses)} poses")
     if temp_dir is not None and memory is None and box is None and planes is None:
         raise ValueError("temp_dir needs memory, box or planes")
     folder = None if temp_dir is None else path(temp_dir, "temp_dir")
-    nodes = Parser(expression, len(models)).all()
-    handles = [model.model for model in models]
-    operands = (c.ebpo_boolean_operand * len(models))()
-    for operand, given, where in zip(operands, handles, poses):
-        operand.model, operand.pose = given.pointer, pose_of(where)
+    nodes = Parser(expression, len(given)).all()
+    handles = [handle for handle, _, _ in given]
+    operands = (c.ebpo_boolean_operand * len(given))()
+    for operand, (_, model, pose), where in zip(operands, given, poses):
+        operand.model, operand.pose = model, pose if where is None else pose_of(where)
     options = made(c.ebpo_boolean_options, threads=threads or 0, temp_dir=folder)
     corners = None if box is None else numbers(box, "box", 6)
     rows = None if planes is None else numbers(planes, "planes", 4)
@@ -124,7 +128,7 @@ def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | 
         options.box = corners.ctypes.data
     if rows is not None:
         options.planes, options.plane_count = rows.ctypes.data, len(rows) // 4
-    handle = Handle.made("ebpo_boolean_new", operands, len(models), (c.ebpo_boolean_node * len(nodes))(*nodes),
+    handle = Handle.made("ebpo_boolean_new", operands, len(given), (c.ebpo_boolean_node * len(nodes))(*nodes),
                          len(nodes), ctypes.byref(options), free="ebpo_boolean_free",
                          keep=handles)
     workspace = None
@@ -138,6 +142,18 @@ def boolean(expression: str, models: Sequence[Model], *, poses: Sequence[Pose | 
         call("ebpo_boolean_mesh", handle, ctypes.byref(how), mesh, ctypes.byref(report))
     bounds = (report.volume.lo, report.volume.hi) if volume else (math.nan, math.nan)
     return Result(*mesh_of(mesh), report.displacement, bounds)
+
+
+def operands_of(item: Model | Scene, time: float | None) -> list[tuple[Handle, int, c.ebpo_pose]]:
+    """Return the owner, the address of the model and the pose of each operand that a model or a scene stands for."""
+    if not isinstance(item, Scene):
+        return [(item.model, item.model.pointer, pose_of(None))]
+    operands, count = (c.ebpo_boolean_operand * len(item.instances))(), ctypes.c_uint32()
+    with item._lock:
+        handle = item._handle
+        call("ebpo_boolean_get_operands", handle, item.begin if time is None else time, operands, len(operands),
+             ctypes.byref(count))
+    return [(handle, operand.model, operand.pose) for operand in operands]
 
 
 def numbers(values: ArrayLike, name: str, width: int) -> np.ndarray:
