@@ -478,15 +478,19 @@ typedef struct corner {
     bool exact; /* true: the tails of `x` are 0, so `head` is exact */
 } corner;
 
-static corner corner_at(const ebpo_segment *ray, const double p[3])
+/* Sets a corner in place. (A corner that is returned by value is copied in larger parts than it was
+ * stored in, for which processors wait.) */
+static inline void set_corner(corner *c, const ebpo_segment *ray, const double p[3])
 {
-    corner c = { .at = p, .exact = true };
+    bool exact = true;
+    c->at = p;
     for (int k = 0; k < 3; k++) {
-        c.x[k] = ebpo_two_difference(p[k], ray->origin[k]);
-        c.head[k] = c.x[k].head;
-        c.exact &= c.x[k].tail == 0;
+        ebpo_pair x = ebpo_two_difference(p[k], ray->origin[k]);
+        c->x[k] = x;
+        c->head[k] = x.head;
+        exact &= x.tail == 0;
     }
-    return c;
+    c->exact = exact;
 }
 
 static inline bool is_origin(const corner *c)
@@ -545,7 +549,7 @@ static bool intersect_closely(const ebpo_segment *ray, const double triangle[3][
     if (!ray_in_range(ray, triangle))
         return false;
     for (int i = 0; i < 3; i++) {
-        e[i] = corner_at(ray, triangle[i]);
+        set_corner(&e[i], ray, triangle[i]);
         begins |= is_origin(&e[i]);
     }
     close_sides(ray->direction, e, sign);
@@ -583,7 +587,7 @@ static bool intersects_shared(const ebpo_segment *ray, const double a[3][3], con
     int count = 0;
     for (int i = 0; i < 3; i++)
         if (has_corner(b, a[i]))
-            shared[count++] = corner_at(ray, a[i]);
+            set_corner(&shared[count++], ray, a[i]);
     if (count == 0 || !ray_in_range(ray, a))
         return false;
     if (count == 3 && has_corner(a, b[0]) && has_corner(a, b[1]) && has_corner(a, b[2]))

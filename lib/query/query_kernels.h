@@ -241,11 +241,11 @@ typedef struct ebpo_inside_kernels {
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
-enum { EBPO_RAY_PACKET = 8 };
+enum { EBPO_RAY_PACKET = 8 }; /* maximum number of rays of walk_many */
 typedef struct ebpo_ray_kernels {
     void (*walk)(ebpo_ray_search *search);
-    /* Walks for up to EBPO_RAY_PACKET rays through the same accel, which all want the first hit.
-     * Coherent rays (similar origins and directions) are walked together. */
+    /* Walks through one accel for one or more searches, which all want the first hit. Searches with
+     * similar origins and directions are done together. */
     void (*walk_many)(ebpo_ray_search *const *search, unsigned count);
 } ebpo_ray_kernels;
 

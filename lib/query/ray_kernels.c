@@ -1,6 +1,6 @@
-/* Implements the kernel that finds the hits of a ray. The kernel walks down the hierarchy over
- * blocks of faces of one accel (acceleration structure of a subtree, accel.h), and filters eight
- * faces at a time, in single precision.
+/* Implements the kernels that find the hits of a ray, or of several rays together. A kernel walks
+ * down the hierarchy over blocks of faces of one accel (acceleration structure of a subtree,
+ * accel.h), and filters eight faces at a time, in single precision.
  *
  * The kernel drops only faces that the ray certainly misses, or certainly hits beyond the limit of
  * t (a hit is at origin + t * direction). If the kernel reports a certain hit, the face is also hit
@@ -359,6 +359,7 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, bool wide, bool 
     }
 }
 
+/* Walks through a child with the variant of ray_walk_in for this search. */
 static void ray_walk_from(ebpo_ray_search *r, uint32_t begin)
 {
     bool sorted = r->wants == EBPO_WANTS_FIRST;
@@ -468,7 +469,7 @@ EBPO_EIGHT void packet_set_bound(ray_packet *p)
     p->bound = -f8_least(f8_sub(f8_all(0), f8_load(p->bounds)));
 }
 
-/* Unused lanes have a bound of -1, so they miss all boxes. */
+/* Sets a packet. Unused lanes have a bound of -1, so they miss all boxes. */
 static void packet_set(ray_packet *p, ebpo_ray_search *const *ray, unsigned count)
 {
     p->ray = ray;

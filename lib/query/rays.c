@@ -407,7 +407,7 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
 
 /* Prepares the search of the faces of a subtree or of the whole model. Returns false if the ray
  * misses all faces. */
-static bool cast_begin(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
+static bool begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
 {
     r->ray = &c->ray;
     r->wants = c->wants;
@@ -422,7 +422,7 @@ static bool cast_begin(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
 static void cast_subtree(casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
-    if (!cast_begin(c, &r, s))
+    if (!begin_search(c, &r, s))
         return;
     c->context->model->kernels.ray->walk(&r);
     judge_waiting(&r);
@@ -621,7 +621,8 @@ typedef struct batch {
 
 /* --- a ray of many --- */
 
-static void cast_begin_of(batch *b, uint64_t i, unsigned worker, casting *c)
+/* Begins the query of ray i. */
+static void begin_ray(batch *b, uint64_t i, unsigned worker, casting *c)
 {
     const ebpo_ray *r = &b->rays[i];
     casting_begin(c, b->context[worker], r->origin, r->direction, r->t_max, b->wants,
@@ -639,7 +640,7 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
                             ebpo_error *error)
 {
     casting c;
-    cast_begin_of(b, i, worker, &c);
+    begin_ray(b, i, worker, &c);
     c.rounds = rounds;
     ebpo_status status = ray_walk(&c, error);
     *waits = c.waits;
@@ -660,7 +661,8 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
     return status;
 }
 
-/* Finds the first hits of some rays of a whole model together. */
+/* Finds the first hits of these rays, at most EBPO_RAY_PACKET, in a model that is completely in
+ * memory. Results are those of cast_one. */
 static ebpo_status cast_packet(batch *b, const uint64_t *ray, unsigned count, unsigned worker,
                                ebpo_error *error)
 {
@@ -670,8 +672,8 @@ static ebpo_status cast_packet(batch *b, const uint64_t *ray, unsigned count, un
     unsigned walking = 0;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < count; i++) {
-        cast_begin_of(b, ray[i], worker, &c[i]);
-        if (cast_begin(&c[i], &search[i], m->whole))
+        begin_ray(b, ray[i], worker, &c[i]);
+        if (begin_search(&c[i], &search[i], m->whole))
             active[walking++] = &search[i];
     }
     if (walking)
@@ -688,7 +690,7 @@ static ebpo_status cast_packet(batch *b, const uint64_t *ray, unsigned count, un
     return status;
 }
 
-/* Finds the first hits of the rays begin .. end - 1 of a whole model. */
+/* Finds the first hits of the rays begin .. end - 1 in a model that is completely in memory. */
 static ebpo_status cast_packets(batch *b, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
