@@ -109,6 +109,15 @@ def installed(folder, target):
             yield (path.parent / soname).relative_to(prefix).as_posix(), path
 
 
+def viewer():
+    """Yield the name in the wheel and the path of each file of the web viewer, if it was built before."""
+    folder = ROOT / "tools/web/dist"
+    if (folder / "index.html").is_file():
+        for path in sorted(folder.iterdir()):
+            if path.suffix != ".gz": # for nginx
+                yield f"share/ebpo/viewer/{path.name}", path
+
+
 def glibc(file):
     """Return the versions of glibc that a library needs, from its table of needed versions."""
     printed = run("readelf", "--wide", "--version-info", file, LC_ALL="C").partition("Version needs section")[2]
@@ -128,6 +137,8 @@ def tag(files):
 def licences(libraries):
     """Yield (name, text) of the licences of all code in the wheel."""
     yield "licenses/ebpo.txt", (ROOT / "LICENSE").read_bytes()
+    if any(viewer()):
+        yield "licenses/three.js.txt", (ROOT / "tools/web/node_modules/three/LICENSE").read_bytes()
     if libraries:
         for path in sorted((libraries / "licences").iterdir()):
             yield f"licenses/{path.name}", path.read_bytes()
@@ -186,6 +197,7 @@ def pack(folder, dist, libraries=None):
         programs = list(installed(folder, pathlib.Path(target)))
         tagged = tag([path for _, path in programs])
         entries += [(f"ebpo/{place}", path.read_bytes(), True) for place, path in programs]
+    entries += [(f"ebpo/{place}", path.read_bytes(), False) for place, path in viewer()]
     entries.append((f"{name}.data/scripts/ebpo", COMMAND, True))
     head = f"Wheel-Version: 1.0\nGenerator: ebpo_wheel {version()}\nRoot-Is-Purelib: false\nTag: {tagged}\n"
     for place, data in [*licences(libraries), ("METADATA", metadata()), ("WHEEL", head.encode())]:
