@@ -40,6 +40,16 @@ text = subprocess.run([command, "--version", "--verbose"], check=True, capture_o
 assert f"library: {here}/lib/libebpo.so.0" in text and f"HDF5 plugin: {here}/lib/hdf5/plugin" in text, text
 print("converted and queried")
 """
+# `ebpo serve` of the wheel finds the viewer in the wheel.
+SERVE = """
+import os, subprocess, sys, urllib.request
+server = subprocess.Popen([os.path.join(sys.prefix, "bin", "ebpo"), "serve", "-q", "--port", "0", "sphere.ebpo.h5"],
+                          stdout=subprocess.PIPE, text=True)
+page = urllib.request.urlopen(server.stdout.readline().strip()).read()
+server.terminate()
+assert server.wait() == 0 and b"<html" in page, page[:200]
+print("served the viewer")
+"""
 
 
 def run(*words, **options):
@@ -118,6 +128,10 @@ def main():
         run(inputs, ".")
         nothing = {name: value for name, value in os.environ.items() if not name.startswith(("EBPO", "PYTHON", "LD_"))}
         print(run(python, "-c", QUERY, env=dict(nothing, PATH="/usr/bin:/bin")), end="")
+        if "ebpo/share/ebpo/viewer/index.html" in zipfile.ZipFile(pathlib.Path("dist", wheel)).namelist():
+            print(run(python, "-c", SERVE, env=dict(nothing, PATH="/usr/bin:/bin")), end="")
+        else:
+            print("not tested: the viewer, because tools/web/dist was not built")
         if subprocess.run([python, "-c", "import h5py"]).returncode == 0:
             for order in ("first", "last"):
                 print(run(python, os.path.join(source, "tests/python/wheel_with_h5py.py"), order, "sphere.ply",

@@ -14,7 +14,7 @@ const VERTEX = `
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
-  varying vec3 lent;
+  centroid varying vec3 lent;
   varying float turned;
   flat varying int kind;
   uniform int colouring, chosen; // chosen: the highlighted instance
@@ -48,7 +48,7 @@ const FRAGMENT = `
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
-  varying vec3 lent;
+  centroid varying vec3 lent;
   varying float turned; // 1 for real faces, whose back is lit like the front; the back of an envelope is visible only through cracks
   flat varying int kind;
   uniform vec3 low, high; // the visible box
@@ -61,11 +61,15 @@ const FRAGMENT = `
     float size = dot(flatly, flatly); // zero or invalid on triangles smaller than a pixel
     vec3 n = size > 0.0 && size < 1.0 ? flatly * inversesqrt(size) : toEye;
     float weight = min(length(lent), 1.0);
-    vec3 smoothly = lent * (gl_FrontFacing ? 1.0 : -1.0);
+    // Backs of faces are small dots where triangles are folded over at borders of patches (the normal points to the eye), and at contours, where front and back have
+    // equal depth (the normal is almost perpendicular to the view). These are lit as the front; other backs have the opposite normal.
+    float facing = dot(lent, toEye);
+    bool back = !gl_FrontFacing && !(turned > 0.5 && facing > 0.0);
+    vec3 smoothly = gl_FrontFacing ? lent : turned < 0.5 ? -lent : mix(lent - 2.0 * min(facing, 0.0) * toEye, -lent, smoothstep(0.1, 0.4, -facing));
     n = normalize(mix(n, smoothly / max(weight, 0.001), weight) + 0.0001 * toEye);
-    if (!gl_FrontFacing && turned < 0.5) n = normalize(lent + toEye); // as bright as the surface around the crack
+    if (back && turned < 0.5) n = normalize(lent + toEye); // as bright as the surface around the crack
     n = normalize(n + toEye * max(0.0, 0.15 - dot(n, toEye)));
-    if (!gl_FrontFacing && clipping) { // the back of a closed body, visible through the cut, fills the section
+    if (back && clipping) { // the back of a closed body, visible through the cut, fills the section
       float hatch = abs(fract((gl_FragCoord.x + gl_FragCoord.y) / 9.0) - 0.5) < 0.07 ? 0.82 : 1.0;
       gl_FragColor = vec4(mix(section, colour, 0.22) * hatch, 1.0);
     } else {
