@@ -281,6 +281,7 @@ class Notebooks(Case):
             with urllib.request.urlopen(shown.address + "models/0/scan.ebpo.h5") as file:
                 self.assertEqual(file.read(), pathlib.Path("scan.ebpo.h5").read_bytes())
             process = shown._process
+            self.assertNotEqual(os.getpgid(process.pid), os.getpgrp())  # an interrupt is sent to the group
             child = os.fork()
             if not child:  # a forked process does not end the server of the old one
                 shown.close()

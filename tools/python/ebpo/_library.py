@@ -27,7 +27,8 @@ def candidates():
         return
     yield from map(str, sorted(HERE.glob("lib/libebpo.so*")))  # the library in a wheel
     several = sysconfig.get_config_var("MULTIARCH") or "."  # Debian has a folder for each machine type
-    for folder in (HERE.parents[2], HERE.parents[2] / "lib", HERE.parents[2] / several):  # prefix, build, Debian
+    above = (HERE / "../../..").resolve()
+    for folder in (above, above / "lib", above / several):  # prefix, build, Debian
         yield from map(str, sorted(folder.glob("libebpo.so.?")))
     try:
         printed = subprocess.run(["ebpo", "--version", "--verbose"], capture_output=True, text=True)

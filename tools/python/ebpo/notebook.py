@@ -45,7 +45,8 @@ class Viewer:
         folder = [] if viewer is None else [b"--viewer", path(viewer, "viewer")]
         with tempfile.TemporaryFile() as messages:
             self._process = subprocess.Popen([command(), b"serve", b"-q", b"--port", b"0", *folder, b"--", path(source)],
-                                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages)
+                                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=messages,
+                                             start_new_session=True)  # an interrupt of a cell does not end it
             assert self._process.stdout
             self.address: str = self._process.stdout.readline().decode().strip()
             self._end = weakref.finalize(self, stop, self._process)
@@ -83,9 +84,9 @@ def stop(process: subprocess.Popen[bytes]) -> None:
 def command() -> str:
     """Return the path of the command `ebpo`: that of the wheel, of the build folder, of the prefix, or in PATH."""
     here = pathlib.Path(__file__).resolve().parent
-    for file in (here / "bin/ebpo", here.parents[1] / "ebpo", here.parents[3] / "bin/ebpo"):
-        if file.is_file():
-            return str(file)
+    for name in ("bin/ebpo", "../../ebpo", "../../../../bin/ebpo"):
+        if (here / name).is_file():
+            return str(here / name)
     found = shutil.which("ebpo")
     if not found:
         raise UnsupportedError("the command ebpo, which serves the viewer, is not in PATH; install it",
