@@ -6,7 +6,7 @@ import { LEAF } from './tree.js';
 export const KEY = 'surface';      // key of the tile
 const CELL_PIXELS = 16;            // normal detail
 const ERROR = 2;                   // allowed error in pixels at normal detail; most of a patch is much closer to the model
-const TRIANGLES = 150_000;          // most triangles at this detail; twice as many at half of the pixels, which fast machines draw
+const TRIANGLES = 150_000;         // most triangles at this detail; twice as many at half of the pixels, which fast machines draw
 const EVERYTHING = 2_000_000;      // most triangles at all
 const WHOLE_FACES = 1 << 18;       // small files with at most so many faces are drawn with all faces
 const KEPT = 0.6;                  // a replaced patch returns when its error is smaller than this share of the allowed error
