@@ -157,7 +157,7 @@ static double to_frame(ebpo_ray_search *r)
  * the cube from -2 * `largest` to 2 * `largest`. `largest`: upper bound of the faces' coordinates.
  * Returns false if the ray misses the cube. The rounding error of *t is far smaller than the margin
  * between faces and cube. (An origin that is too far away for this computation is not moved: see
- * ray_search_accel.) */
+ * ray_search_begin.) */
 static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
 {
     double from = 0, to = INFINITY;
