@@ -164,7 +164,7 @@ struct ebpo_ray_search {
     void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
     void *user;
 
-    /* ebpo_ray_search_accel sets the following fields. */
+    /* ray_search_begin (rays.c) sets the following fields. */
     bool done;    /* the search is complete */
     bool any_hit; /* EBPO_WANTS_ANY: some face is certainly hit, and `decide` was not called */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */

@@ -328,12 +328,13 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
     return b->child[__builtin_ctz(lanes)];
 }
 
-/* Walks through a child of the hierarchy (as in ebpo_bound). `sorted`: visits nearer children
- * first, which is faster if the limit decreases during the walk. */
-EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, bool wide, bool sorted)
+/* Walks through a child of the hierarchy (as in ebpo_bound). `stack`: space for the visits.
+ * `sorted`: visits nearer children first, which is faster if the limit decreases during the walk.
+ */
+EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack, bool wide,
+                            bool sorted)
 {
     const ebpo_accel *s = r->s;
-    ebpo_visit stack[EBPO_VISITS_MAX];
     uint32_t top = 1;
     stack[0] = ebpo_visit_make(0, begin);
     while (top && !r->done) {
@@ -360,32 +361,33 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, bool wide, bool 
 }
 
 /* Walks through a child with the variant of ray_walk_in for this search. */
-static void ray_walk_from(ebpo_ray_search *r, uint32_t begin)
+static void ray_walk_from(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack)
 {
     bool sorted = r->wants == EBPO_WANTS_FIRST;
     if (r->s->wide && sorted)
-        ray_walk_in(r, begin, true, true);
+        ray_walk_in(r, begin, stack, true, true);
     else if (r->s->wide)
-        ray_walk_in(r, begin, true, false);
+        ray_walk_in(r, begin, stack, true, false);
     else if (sorted)
-        ray_walk_in(r, begin, false, true);
+        ray_walk_in(r, begin, stack, false, true);
     else
-        ray_walk_in(r, begin, false, false);
+        ray_walk_in(r, begin, stack, false, false);
 }
 
 /* Walks through the accel with a search whose fields for boxes and faces are set. */
-static void ray_walk_alone(ebpo_ray_search *r)
+static void ray_walk_alone(ebpo_ray_search *r, ebpo_visit *stack)
 {
-    ray_walk_from(r, r->s->root_bound);
+    ray_walk_from(r, r->s->root_bound, stack);
     if (r->wants == EBPO_WANTS_FIRST)
         drop_beyond(r);
 }
 
 static void ray_walk(ebpo_ray_search *r)
 {
+    ebpo_visit stack[EBPO_VISITS_MAX];
     ray_set_boxes(r);
     ray_set_faces(r);
-    ray_walk_alone(r);
+    ray_walk_alone(r, stack);
 }
 
 /* --- packets: several rays walked together --- */
@@ -548,10 +550,11 @@ EBPO_EIGHT void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block,
     packet_set_bound(p);
 }
 
-/* Walks with one ray through a child that no other ray enters. */
-EBPO_EIGHT void packet_single(ray_packet *p, uint32_t child, unsigned ray)
+/* Walks with one ray through a child that no other ray enters. `stack`: the free part of the
+ * packet's stack, which has space for the levels below the child. */
+EBPO_EIGHT void packet_single(ray_packet *p, uint32_t child, ebpo_visit *stack, unsigned ray)
 {
-    ray_walk_from(p->ray[ray], child);
+    ray_walk_from(p->ray[ray], child, stack);
     p->bounds[ray] = p->ray[ray]->bound;
     packet_set_bound(p);
 }
@@ -578,9 +581,8 @@ EBPO_EIGHT uint32_t packet_push(const ebpo_accel *s, ebpo_visit *stack, uint32_t
 }
 
 /* Walks through the accel with all rays. */
-EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, bool wide)
+EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack, bool wide)
 {
-    ebpo_visit stack[EBPO_VISITS_MAX];
     f8 enter;
     unsigned lanes = packet_children(p, &s->bound[s->root_bound], &enter);
     uint32_t top = packet_push(s, stack, 0, s->root_bound, lanes, enter, wide);
@@ -595,7 +597,7 @@ EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, bool wide)
         if (!rays)
             continue;
         if (!(rays & (rays - 1))) {
-            packet_single(p, child, (unsigned)__builtin_ctz(rays));
+            packet_single(p, child, stack + top, (unsigned)__builtin_ctz(rays));
         } else if (child & EBPO_IS_BLOCK) {
             packet_block(p, s, child & ~EBPO_IS_BLOCK, rays, wide);
         } else {
@@ -610,6 +612,7 @@ EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, bool wide)
 static void ray_walk_many(ebpo_ray_search *const *ray, unsigned count)
 {
     ray_packet p;
+    ebpo_visit stack[EBPO_VISITS_MAX];
     for (unsigned i = 0; i < count; i++) {
         ray_set_boxes(ray[i]);
         ray_set_faces(ray[i]);
@@ -617,14 +620,14 @@ static void ray_walk_many(ebpo_ray_search *const *ray, unsigned count)
     const ebpo_accel *s = ray[0]->s;
     if (s->root_bound & EBPO_IS_BLOCK || !packet_is_coherent(ray, count)) {
         for (unsigned i = 0; i < count; i++)
-            ray_walk_alone(ray[i]);
+            ray_walk_alone(ray[i], stack);
         return;
     }
     packet_set(&p, ray, count);
     if (s->wide)
-        packet_walk(&p, s, true);
+        packet_walk(&p, s, stack, true);
     else
-        packet_walk(&p, s, false);
+        packet_walk(&p, s, stack, false);
 }
 
 const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };

@@ -157,7 +157,7 @@ static double to_frame(ebpo_ray_search *r)
  * the cube from -2 * `largest` to 2 * `largest`. `largest`: upper bound of the faces' coordinates.
  * Returns false if the ray misses the cube. The rounding error of *t is far smaller than the margin
  * between faces and cube. (An origin that is too far away for this computation is not moved: see
- * ray_search_accel.) */
+ * ray_search_begin.) */
 static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
 {
     double from = 0, to = INFINITY;
@@ -661,29 +661,35 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
     return status;
 }
 
+/* Space for rays that are walked together. It is not on the stack, because a query needs less than
+ * 64 KiB of it (ebpo/base.h). */
+typedef struct packet {
+    casting c[EBPO_RAY_PACKET];
+    ebpo_ray_search search[EBPO_RAY_PACKET];
+} packet;
+
 /* Finds the first hits of these rays, at most EBPO_RAY_PACKET, in a model that is completely in
  * memory. Results are those of cast_one. */
-static ebpo_status cast_packet(batch *b, const uint64_t *ray, unsigned count, unsigned worker,
-                               ebpo_error *error)
+static ebpo_status cast_packet(batch *b, packet *p, const uint64_t *ray, unsigned count,
+                               unsigned worker, ebpo_error *error)
 {
-    casting c[EBPO_RAY_PACKET];
-    ebpo_ray_search search[EBPO_RAY_PACKET], *active[EBPO_RAY_PACKET];
+    ebpo_ray_search *active[EBPO_RAY_PACKET];
     const ebpo_model *m = b->context[worker]->model;
     unsigned walking = 0;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < count; i++) {
-        begin_ray(b, ray[i], worker, &c[i]);
-        if (begin_search(&c[i], &search[i], m->whole))
-            active[walking++] = &search[i];
+        begin_ray(b, ray[i], worker, &p->c[i]);
+        if (begin_search(&p->c[i], &p->search[i], m->whole))
+            active[walking++] = &p->search[i];
     }
     if (walking)
         m->kernels.ray->walk_many(active, walking);
     for (unsigned i = 0; i < walking; i++)
         judge_waiting(active[i]);
     for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
-        status = ray_end(&c[i], EBPO_OK, error);
+        status = ray_end(&p->c[i], EBPO_OK, error);
         if (status == EBPO_OK)
-            store_first(b, ray[i], &c[i]);
+            store_first(b, ray[i], &p->c[i]);
         if (status == EBPO_OK && b->options.done)
             b->options.done[ray[i]] = true;
     }
@@ -694,15 +700,17 @@ static ebpo_status cast_packet(batch *b, const uint64_t *ray, unsigned count, un
 static ebpo_status cast_packets(batch *b, uint64_t begin, uint64_t end, unsigned worker,
                                 ebpo_error *error)
 {
-    ebpo_status status = EBPO_OK;
+    packet *p = ebpo_alloc(1, sizeof *p);
+    ebpo_status status = p ? EBPO_OK : ebpo_fail_memory(error, sizeof *p);
     for (uint64_t i = begin; i < end && status == EBPO_OK;) {
         uint64_t ray[EBPO_RAY_PACKET];
         unsigned count = 0;
         for (; i < end && count < EBPO_RAY_PACKET; i++)
             if (!b->options.done || !b->options.done[i])
                 ray[count++] = i;
-        status = cast_packet(b, ray, count, worker, error);
+        status = cast_packet(b, p, ray, count, worker, error);
     }
+    free(p);
     return status;
 }
 

@@ -140,6 +140,45 @@ START_TEST(test_query_stack_size)
 }
 END_TEST
 
+/* Finds the first hits of similar rays in the plane of a side of a box. A batch walks them
+ * together. So many faces of the plane may be hit that they are compared in exact arithmetic during
+ * the walk.
+ */
+static void *query_in_plane(void *user)
+{
+    enum { RAYS = 8 };
+    run *r = user;
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    ebpo_ray rays[RAYS];
+    ebpo_ray_hit hits[RAYS];
+    options.threads = 1;
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (ebpo_ray){ { -0.3, 0.1 + 0.001 * i, 1 }, { 1, 0.7, 0 }, INFINITY };
+    r->status = ebpo_ray_first_many(r->session->context, rays, RAYS, &options, hits, &r->error);
+    return NULL;
+}
+
+START_TEST(test_ray_batch_stack_size)
+{
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    mix_session session = { 0 };
+    run r = { .session = &session, .error = EBPO_ERROR_INIT };
+    ebpo_tree tree =
+        model_build_parts(ebpo_test_box(low, high, 20), 4, ebpo_profile_parts(EBPO_PROFILE_FULL));
+    model_write(&tree, model_path(), NULL);
+    session.file = model_open(model_path());
+    model_must(ebpo_model_new(session.file, NULL, &session.model, &r.error), "a model", &r.error);
+    model_must(ebpo_context_new(session.model, &session.context, &r.error), "a context", &r.error);
+    size_t bytes = stack_of(query_in_plane, &r);
+    model_must(r.status, "asking", &r.error);
+    printf("rays in a plane: %zu bytes of stack\n", bytes);
+    ck_assert_msg(bytes <= PROMISED - BESIDE, "%zu bytes of stack", bytes);
+    ebpo_context_free(session.context);
+    ebpo_model_free(session.model);
+    ebpo_close((ebpo_file *)session.file);
+}
+END_TEST
+
 /* Checks a mesh, and builds, writes, reads and verifies a file, on the calling thread. */
 static void *build(void *user)
 {
@@ -192,6 +231,7 @@ Suite *test_suite(void)
     TCase *stacks = tcase_create("stacks");
     tcase_add_test(stacks, test_small_thread_stacks_can_be_created);
     tcase_add_test(stacks, test_query_stack_size);
+    tcase_add_test(stacks, test_ray_batch_stack_size);
     tcase_add_test(stacks, test_build_stack_size);
     tcase_set_timeout(stacks, 300);
     suite_add_tcase(suite, stacks);
