@@ -55,7 +55,9 @@ folder, name, root = pathlib.Path(sys.argv[1]), sys.argv[2], pathlib.Path(sys.ar
 installed = next((folder / "installed").rglob("ebpo.exe")).parents[1]
 entries = {f"{path.relative_to(installed)}": path for path in installed.rglob("*")
            if path.suffix in (".exe", ".dll", ".h") or path.name.endswith(".dll.a") or
-           (path.is_file() and path.parent.name == "viewer")}
+           (path.parent.name == "viewer" and path.suffix != ".gz")}
+if any("/viewer/" in place for place in entries):
+    entries["licences/three.txt"] = root / "tools/web/node_modules/three/LICENSE"
 entries["licences/ebpo.txt"] = root / "LICENSE"
 for package in ("mingw-w64-common", "gcc-mingw-w64-base"):  # parts of their libraries are in the programs
     entries[f"licences/{package}.txt"] = pathlib.Path(f"/usr/share/doc/{package}/copyright")
