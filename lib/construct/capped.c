@@ -299,7 +299,7 @@ bool ebpo_capped_may_hold(const ebpo_capped *capped, ebpo_cell cell, int32_t win
     int result = ebpo_cap_front_result(&front, &capped->rule, winding, -1, &terms);
     if (result >= 0)
         return result;
-    double variation = ebpo_cap_variation(&capped->caps, &box, EBPO_PI_LOW);
+    double variation = ebpo_cap_variation(&capped->caps, &box, NULL, 0, EBPO_PI_LOW);
     if (variation == INFINITY)
         return true;
     winding += ebpo_cap_path_crossings(&capped->caps, 0, low, box.centre);

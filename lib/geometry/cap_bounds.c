@@ -390,9 +390,16 @@ static void vary_by_loops(varying *v, uint64_t at)
     }
 }
 
-double ebpo_cap_variation(const ebpo_cap_tree *tree, const ebpo_cap_box *box, double most)
+double ebpo_cap_variation(const ebpo_cap_tree *tree, const ebpo_cap_box *box, const uint32_t *entry,
+                          uint64_t count, double most)
 {
     varying v = { tree, box, 0, most };
+    for (uint64_t i = 0; i < count && v.sum < most; i++)
+        if (!(entry[i] & EBPO_CAP_TRIANGLE))
+            (tree->node[entry[i]].weight ? vary_by_path : vary_by_loops)(&v, entry[i]);
+    if (!(v.sum < most))
+        return INFINITY;
+    v.sum = 0;
     if (tree->node_count > 0)
         vary_by_loops(&v, 0);
     v.sum = v.sum * ENLARGE + TINY;

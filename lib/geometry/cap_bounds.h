@@ -40,18 +40,19 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
                                   const ebpo_cap_box *box, uint64_t begin, uint64_t end,
                                   uint64_t most, ebpo_bounded *far);
 
-/* A cell in which some points are inside and others may be outside, so a query must decide for each
- * point. The cell has the sum of the bounds of far discs, and a list of entries for the other
- * discs: ebpo_node_table.disc[first .. first + count). */
+/* A cell that contains cells in which some points are inside and others may be outside, so a query
+ * must decide for each point. The record has the sum of the bounds of far discs, and a list of
+ * entries for the other discs: ebpo_node_table.disc[first .. first + count). */
 typedef struct ebpo_near_cell {
     float far_middle, far_error; /* ebpo_bounded of the far discs */
     /* If no face touches the cell: the winding number k of the mesh with its caps, at the lowest
-     * corner. If the cell is a part of a leaf: the index of the ebpo_near_cell of the whole leaf,
-     * whose list has all caps that may touch the leaf; -1: no cap touches the leaf. */
+     * corner. If the cell is a leaf or a part of a leaf: the index of the ebpo_near_cell of the
+     * whole leaf, whose list has all caps that may touch the leaf; -1: no cap touches the leaf. */
     int32_t winding;
     uint32_t first;
     uint16_t count;
     bool touched; /* true: a cap may touch the cell */
+    uint8_t level;
 } ebpo_near_cell;
 
 /* Decides as ebpo_cap_decide does, at a point p of a cell. `disc`: the cell's list of entries. If
@@ -59,6 +60,10 @@ typedef struct ebpo_near_cell {
 ebpo_cap_decision ebpo_cap_decide_near(const ebpo_cap_tree *tree, const ebpo_near_cell *cell,
                                        const uint32_t *disc, const double p[3], int32_t winding,
                                        const ebpo_cap_rule *rule);
+
+/* Returns false if certainly no cap of the list touches the box. */
+bool ebpo_cap_list_near(const ebpo_cap_tree *tree, const uint32_t *entry, uint64_t count,
+                        const double low[3], const double high[3]);
 
 /* Returns the sum of the crossings of a path with the caps of an entry. A crossing is 1, -1 or 0,
  * as ebpo_axis_crossing defines it. The path leads from the lowest corner `low` of a cell to a
@@ -97,7 +102,9 @@ bool ebpo_cap_front_refine(ebpo_cap_front *front);
 /* w_S is the winding number of the mesh without caps. Returns an upper bound of the difference of 2
  * pi w_S between the centre of a box and any point of the box. Returns INFINITY if no bound below
  * `most` is found. No face may touch the box, but a cap may cross it, because w_S does not jump at
- * caps. */
-double ebpo_cap_variation(const ebpo_cap_tree *tree, const ebpo_cap_box *box, double most);
+ * caps. `entry`: list of the discs near the box (ebpo_cap_lists_narrow). If their borders alone
+ * give no bound below `most`, the function does not visit the others. */
+double ebpo_cap_variation(const ebpo_cap_tree *tree, const ebpo_cap_box *box, const uint32_t *entry,
+                          uint64_t count, double most);
 
 #endif

@@ -62,7 +62,7 @@ int ebpo_cap_small_in(ebpo_cap_front *front, const ebpo_cap_tree *tree, const do
     if (small >= 0)
         return small;
     /* no cap touches the box, so w_D varies in it as w_S would without faces */
-    double variation = ebpo_cap_variation(tree, &box, EBPO_PI_LOW);
+    double variation = ebpo_cap_variation(tree, &box, NULL, 0, EBPO_PI_LOW);
     if (variation == INFINITY)
         return -1;
     ebpo_cap_front_begin_all(front, tree, &centre);

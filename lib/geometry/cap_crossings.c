@@ -85,6 +85,20 @@ typedef struct cap_visit {
     void *context;
 } cap_visit;
 
+/* Visits the stretch's own triangle. Returns the result of the call, or false without a call if the
+ * triangle's bounding box does not touch the box. */
+static bool visit_triangle(const cap_visit *v, const ebpo_cap_node *n)
+{
+    const ebpo_cap_tree *t = v->tree;
+    const double *a = t->position[n->from], *b = t->position[ebpo_cap_middle(n->from, n->to)],
+                 *c = t->position[n->to];
+    for (int k = 0; k < 3; k++)
+        if ((a[k] < v->low[k] && b[k] < v->low[k] && c[k] < v->low[k]) ||
+            (a[k] > v->high[k] && b[k] > v->high[k] && c[k] > v->high[k]))
+            return false;
+    return v->visit(v->context, a, b, c, n->weight);
+}
+
 /* Visits the discs below a node. Recursive, at most 64 deep. */
 static bool visit_discs(const cap_visit *v, uint64_t at)
 {
@@ -95,13 +109,7 @@ static bool visit_discs(const cap_visit *v, uint64_t at)
     if (n->weight == 0)
         return visit_discs(v, n->from) || visit_discs(v, n->to);
     uint64_t m = ebpo_cap_middle(n->from, n->to), first = ebpo_cap_count(n->from, m);
-    const double *a = t->position[n->from], *b = t->position[m], *c = t->position[n->to];
-    bool apart = false;
-    for (int k = 0; k < 3; k++)
-        apart = apart || (a[k] < v->low[k] && b[k] < v->low[k] && c[k] < v->low[k]) ||
-                (a[k] > v->high[k] && b[k] > v->high[k] && c[k] > v->high[k]);
-    return (!apart && v->visit(v->context, a, b, c, n->weight)) ||
-           (first && visit_discs(v, at + 1)) ||
+    return visit_triangle(v, n) || (first && visit_discs(v, at + 1)) ||
            (ebpo_cap_count(m, n->to) && visit_discs(v, at + 1 + first));
 }
 
@@ -122,4 +130,16 @@ static bool stop_visit(void *context, const double a[3], const double b[3], cons
 bool ebpo_caps_near(const ebpo_cap_tree *tree, const double low[3], const double high[3])
 {
     return ebpo_caps_visit(tree, low, high, stop_visit, NULL);
+}
+
+bool ebpo_cap_list_near(const ebpo_cap_tree *tree, const uint32_t *entry, uint64_t count,
+                        const double low[3], const double high[3])
+{
+    const cap_visit v = { tree, low, high, stop_visit, NULL };
+    for (uint64_t i = 0; i < count; i++)
+        if (entry[i] & EBPO_CAP_TRIANGLE
+                ? visit_triangle(&v, &tree->node[entry[i] & ~EBPO_CAP_TRIANGLE])
+                : visit_discs(&v, entry[i]))
+            return true;
+    return false;
 }

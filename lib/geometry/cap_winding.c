@@ -199,18 +199,24 @@ static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_ca
     return result;
 }
 
-/* Returns 1 (inside) or 0 (outside) if bounds in doubles decide, else -1. */
+/* Returns the distance of w from the nearest boundary of the rule. */
+static double boundary_distance(const ebpo_cap_rule *rule, double w)
+{
+    int side;
+    return fabs(w - nearest_boundary(rule, w, &side));
+}
+
+/* Returns 1 (inside) or 0 (outside) if bounds in doubles decide, else -1. Sums with smaller and
+ * smaller tolerances, each as small as the distance from the boundary requires. */
 static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
                             const ebpo_cap_rule *rule, ebpo_bounded *w)
 {
-    const ebpo_cap_box point = ebpo_cap_point(p);
-    ebpo_cap_front front;
-    ebpo_cap_front_begin_all(&front, tree, &point);
-    int result = decide_by_front(&front, winding, rule, w);
-    /* A front has space for few nodes. These sums use as many nodes as the tolerance requires. */
-    for (double t = 0x1p-8; t >= 0 && result < 0; t = next_tolerance(t)) {
+    int result = -1;
+    for (double t = 0x1p-5; t >= 0 && result < 0;) {
         *w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, t), winding);
         result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);
+        double wanted = t / 2 * boundary_distance(rule, w->middle) / w->error;
+        t = t < 0x1p-40 ? next_tolerance(t) : fmax(fmin(t / 4, wanted), 0x1p-41);
     }
     return result;
 }

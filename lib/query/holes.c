@@ -90,6 +90,7 @@ typedef struct near_discs {
     uint64_t begin, end; /* the list: marking.lists.entry[begin .. end - 1] */
     ebpo_bounded far;    /* sum of the half angles (2 pi w_D) of the far discs */
     bool decided;        /* the rule for k decides in the whole cell */
+    int32_t record;      /* of a gray node: index of an ebpo_near_cell for its leaves, or -1 */
 } near_discs;
 
 static ebpo_cap_box box_of(const marking *w, ebpo_cell cell)
@@ -119,11 +120,25 @@ static bool has_large_disc(const marking *w, const ebpo_cap_box *box, const near
 }
 
 /* Returns false if certainly no cap touches the cell. */
-static bool caps_touch(const marking *w, ebpo_cell cell)
+static bool caps_touch(const marking *w, ebpo_cell cell, const near_discs *near)
 {
     double low[3], high[3];
     ebpo_cell_bounds(w->m->box, cell, low, high);
-    return ebpo_caps_near(&w->holes->caps, low, high);
+    return !w->has_memory || ebpo_cap_list_near(&w->holes->caps, w->lists.entry + near->begin,
+                                                near->end - near->begin, low, high);
+}
+
+/* Returns the sum of the crossings with caps on the way from the lowest corner of a cell (`low`) to
+ * a point of the cell. */
+static int32_t cross_near(const marking *w, const near_discs *near, const double low[3],
+                          const double p[3])
+{
+    if (!w->has_memory)
+        return ebpo_holes_crossings(w->holes, low, p);
+    int32_t sum = 0;
+    for (uint64_t i = near->begin; i < near->end; i++)
+        sum += ebpo_cap_path_crossings(&w->holes->caps, w->lists.entry[i], low, p);
+    return sum;
 }
 
 /* Returns true if at most `steps` refinements of the bounds show that |w_D| is small in the cell.
@@ -137,22 +152,25 @@ static bool is_far(marking *w, const ebpo_cap_box *box, const near_discs *near, 
 /* Begins to bound w_D at the centre of a cell. *variation bounds the difference between the values
  * at the centre and at any other point of the cell. The values are 2 pi w_S if no face touches the
  * cell, and 2 pi w_D if no cap touches the cell. Returns false if there is no such bound. */
-static bool begin_at_centre(marking *w, const ebpo_cap_box *box, double *variation)
+static bool begin_at_centre(marking *w, const ebpo_cap_box *box, const near_discs *near,
+                            double *variation)
 {
     const ebpo_cap_box centre = ebpo_cap_point(box->centre);
-    *variation = ebpo_cap_variation(&w->holes->caps, box, EBPO_PI_LOW);
+    const uint32_t *list = w->lists.entry + near->begin;
+    uint64_t count = near->end - near->begin;
+    *variation = ebpo_cap_variation(&w->holes->caps, box, list, count, EBPO_PI_LOW);
     if (*variation == INFINITY)
         return false;
-    ebpo_cap_front_begin_all(&w->front, &w->holes->caps, &centre);
+    ebpo_cap_front_begin(&w->front, &w->holes->caps, &centre, list, count, near->far);
     return true;
 }
 
 /* Returns true if the value of w_D at the centre shows that |w_D| is small in the whole cell of a
  * leaf that no cap touches. */
-static bool is_far_by_centre(marking *w, const ebpo_cap_box *box)
+static bool is_far_by_centre(marking *w, const ebpo_cap_box *box, const near_discs *near)
 {
     double variation;
-    return begin_at_centre(w, box, &variation) &&
+    return begin_at_centre(w, box, near, &variation) &&
            ebpo_cap_front_small(&w->front, w->holes->rule.threshold, variation, INT_MAX,
                                 &w->terms) == 1;
 }
@@ -165,10 +183,10 @@ static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, cons
     double variation, low[3], high[3];
     begin_front(w, box, near);
     int result = ebpo_cap_front_result(&w->front, &w->holes->rule, winding, -1, &w->terms);
-    if (result >= 0 || !has_large_disc(w, box, near) || !begin_at_centre(w, box, &variation))
+    if (result >= 0 || !has_large_disc(w, box, near) || !begin_at_centre(w, box, near, &variation))
         return result;
     ebpo_cell_bounds(w->m->box, cell, low, high);
-    winding += ebpo_holes_crossings(w->holes, low, box->centre);
+    winding += cross_near(w, near, low, box->centre);
     return ebpo_cap_front_result(&w->front, &w->holes->rule, winding, variation, &w->terms);
 }
 
@@ -176,13 +194,14 @@ static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, cons
 static bool is_far_leaf(marking *w, ebpo_cell cell, const ebpo_cap_box *box, const near_discs *near)
 {
     return is_far(w, box, near, INT_MAX) ||
-           (has_large_disc(w, box, near) && !caps_touch(w, cell) && is_far_by_centre(w, box));
+           (has_large_disc(w, box, near) && !caps_touch(w, cell, near) &&
+            is_far_by_centre(w, box, near));
 }
 
 /* Makes the list of a cell's near discs from the list of the cell's parent. */
 static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_discs *parent)
 {
-    near_discs near = { w->lists.count, 0, parent->far, parent->decided };
+    near_discs near = { w->lists.count, 0, parent->far, parent->decided, parent->record };
     if (!near.decided && w->has_memory)
         w->has_memory = ebpo_cap_lists_narrow(&w->lists, &w->holes->caps, box, parent->begin,
                                               parent->end, UINT64_MAX, &near.far) == EBPO_OK;
@@ -212,90 +231,112 @@ static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, in
         memcpy(t->disc + t->disc_count, w->lists.entry + near->begin, count * sizeof *t->disc);
     float middle = (float)near->far.middle;
     double error = near->far.error + fabs((double)middle - near->far.middle);
-    t->near[t->near_count] =
-        (ebpo_near_cell){ middle,          (float)error * (1 + 0x1p-22f) + 0x1p-100f,
-                          winding,         (uint32_t)t->disc_count,
-                          (uint16_t)count, caps_touch(w, cell) };
+    t->near[t->near_count] = (ebpo_near_cell){ middle,
+                                               (float)error * (1 + 0x1p-22f) + 0x1p-100f,
+                                               winding,
+                                               (uint32_t)t->disc_count,
+                                               (uint16_t)count,
+                                               caps_touch(w, cell, near),
+                                               (uint8_t)cell.level };
     t->disc_count += count;
     return (int32_t)t->near_count++;
 }
 
-static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
-                         const near_discs *parent);
+/* A cell, or a leaf or a part of a leaf, that is marked. */
+typedef struct marked_cell {
+    ebpo_cell cell;
+    /* of a cell without faces: k at the lowest corner; of a leaf: index of an ebpo_near_cell with
+     * the caps that may touch the leaf, or -1 (see mark_leaf) */
+    int32_t winding;
+    bool leaf;
+    int32_t record; /* index of an ebpo_near_cell that contains the cell, or -1 */
+} marked_cell;
 
-/* Splits a cell into eight parts and marks the parts. Returns the index of the parts in the table's
- * `split`, or -1 if the cell cannot be split. */
-static int32_t split_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
-                          const near_discs *near)
+static int32_t mark_cell(marking *w, const marked_cell *marked, const near_discs *parent);
+
+/* Splits a cell into eight parts and marks the parts. If the parts cannot be split, they share one
+ * ebpo_near_cell, that of the whole cell. Returns the index of the parts in the table's `split`, or
+ * -1 if the cell cannot be split. */
+static int32_t split_cell(marking *w, const marked_cell *whole, const near_discs *near)
 {
     ebpo_node_table *t = w->m->table;
     uint32_t index = t->split_count;
+    marked_cell part = *whole;
     double low[3], corner[3], high[3];
-    if (cell.level >= w->m->deepest || index >= 1 << 25 || !use_bytes(w, sizeof *t->split) ||
+    if (whole->cell.level >= w->m->deepest || index >= 1 << 25 || !use_bytes(w, sizeof *t->split) ||
         !ebpo_grow(&t->split, &w->split_capacity, index + 1, sizeof *t->split))
         return -1;
     t->split_count++;
-    ebpo_cell_bounds(w->m->box, cell, low, high);
+    if (whole->cell.level + 1 == w->m->deepest && whole->record < 0)
+        part.record = store_near(w, whole->cell, near, whole->winding);
+    ebpo_cell_bounds(w->m->box, whole->cell, low, high);
     for (unsigned octant = 0; octant < 8; octant++) {
-        ebpo_cell child = ebpo_cell_child(cell, octant);
-        ebpo_cell_bounds(w->m->box, child, corner, high);
-        int32_t k = winding + (leaf ? 0 : ebpo_holes_crossings(w->holes, low, corner)),
-                marked = mark_cell(w, child, k, leaf, near);
+        part.cell = ebpo_cell_child(whole->cell, octant);
+        ebpo_cell_bounds(w->m->box, part.cell, corner, high);
+        part.winding = whole->winding + (whole->leaf ? 0 : cross_near(w, near, low, corner));
+        int32_t marked = mark_cell(w, &part, near);
         t->split[index][octant] = marked;
     }
     return (int32_t)index;
 }
 
 /* Returns the marked entry of a cell whose points may have different results. `near`: the cell's
- * near discs. Other arguments: as for mark_cell. */
-static int32_t mark_undecided(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
-                              const near_discs *near)
+ * near discs. */
+static int32_t mark_undecided(marking *w, const marked_cell *m, const near_discs *near)
 {
-    int32_t index = split_cell(w, cell, winding, leaf, near);
+    int32_t index = split_cell(w, m, near);
     if (index >= 0)
         return ebpo_marked_entry(index, EBPO_MARK_SPLIT);
-    index = store_near(w, cell, near, winding);
+    index = m->record >= 0 ? m->record : store_near(w, m->cell, near, m->winding);
     return index >= 0 ? ebpo_marked_entry(index, EBPO_MARK_LISTED)
-                      : ebpo_marked_entry(winding, EBPO_MARK_NEAR);
+                      : ebpo_marked_entry(m->winding, EBPO_MARK_NEAR);
 }
 
-/* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf (`leaf`). For a
- * cell without faces, `winding` is k at the cell's lowest corner. For a leaf, `winding` is the
- * index of an ebpo_near_cell with the caps that may touch the leaf, or -1 (see mark_leaf). */
-static int32_t mark_cell(marking *w, ebpo_cell cell, int32_t winding, bool leaf,
-                         const near_discs *parent)
+/* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf. */
+static int32_t mark_cell(marking *w, const marked_cell *m, const near_discs *parent)
 {
-    const ebpo_cap_box box = box_of(w, cell);
+    const ebpo_cap_box box = box_of(w, m->cell);
     const near_discs near = narrow_list(w, &box, parent);
     int32_t result = -1, marked;
     if (near.decided)
-        result = !leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, winding);
+        result = !m->leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, m->winding);
     else if (w->has_memory)
-        result = !leaf                               ? find_result(w, cell, &box, &near, winding)
-                 : is_far_leaf(w, cell, &box, &near) ? 0
-                                                     : -1;
-    w->fits = w->fits && abs(winding) < 1 << 25;
-    marked = result >= 0 ? ebpo_marked_entry(winding, (ebpo_uniform_mark)result)
-                         : mark_undecided(w, cell, winding, leaf, &near);
+        result = !m->leaf ? find_result(w, m->cell, &box, &near, m->winding)
+                 : is_far_leaf(w, m->cell, &box, &near) ? 0
+                                                        : -1;
+    w->fits = w->fits && abs(m->winding) < 1 << 25;
+    marked = result >= 0 ? ebpo_marked_entry(m->winding, (ebpo_uniform_mark)result)
+                         : mark_undecided(w, m, &near);
     w->lists.count = near.begin;
     return marked;
 }
 
+/* Stores an ebpo_near_cell for leaves. Returns its index, or -1. */
+static int32_t store_leaf_record(marking *w, ebpo_cell cell, const near_discs *near)
+{
+    int32_t index = store_near(w, cell, near, 0);
+    if (index >= 0)
+        w->m->table->near[index].winding = index;
+    return index;
+}
+
 /* Marks a leaf, if the rule for k does not decide in it. If caps may touch the leaf, stores these
- * caps in an ebpo_near_cell (index `caps`), because queries must count the crossings with these
- * caps. */
+ * caps in an ebpo_near_cell, because queries must count the crossings with these caps. */
 static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const near_discs *parent)
 {
     const ebpo_accel *s = w->m->accel;
     const ebpo_cap_box box = box_of(w, cell);
     const near_discs near = narrow_list(w, &box, parent);
     if (!near.decided && (!w->has_memory || !is_far_leaf(w, cell, &box, &near))) {
-        bool touched = caps_touch(w, cell);
-        int32_t caps = touched ? store_near(w, cell, &near, 0) : -1;
+        bool touched = caps_touch(w, cell, &near);
+        int32_t caps = near.record >= 0 ? near.record
+                       : touched        ? store_leaf_record(w, cell, &near)
+                                        : -1;
+        marked_cell m = { cell, caps, true, cell.level + 1 >= w->m->deepest ? caps : -1 };
         leaf->kind = EBPO_LEAF_GENERAL;
         leaf->cell_face = EBPO_NEAR_BORDER;
         leaf->rows = (uint32_t)(touched && caps < 0 ? ebpo_marked_entry(0, EBPO_MARK_NEAR)
-                                                    : mark_undecided(w, cell, caps, true, &near));
+                                                    : mark_undecided(w, &m, &near));
         w->m->cell_faces(s, s->list + leaf->list, cell);
     }
     w->lists.count = near.begin;
@@ -303,8 +344,9 @@ static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const n
 
 static uint32_t mark_uniform(marking *w, ebpo_cell cell, int32_t winding, const near_discs *parent)
 {
+    const marked_cell m = { cell, winding, false, -1 };
     uint32_t entry = 0;
-    w->fits = ebpo_entry_uniform(mark_cell(w, cell, winding, false, parent), &entry) && w->fits;
+    w->fits = ebpo_entry_uniform(mark_cell(w, &m, parent), &entry) && w->fits;
     return entry;
 }
 
@@ -326,6 +368,8 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_di
         const ebpo_cap_box box = box_of(w, cell);
         near_discs near = narrow_list(w, &box, parent);
         near.decided = near.decided || (w->has_memory && is_far(w, &box, &near, STEPS));
+        if (w->m->accel && !near.decided && near.record < 0 && cell.level + 1 >= w->m->deepest)
+            near.record = store_leaf_record(w, cell, &near);
         for (unsigned octant = 0; octant < 8; octant++)
             mark_node(w, &t->group[value][octant], ebpo_cell_child(cell, octant), &near);
         w->lists.count = near.begin;
@@ -339,7 +383,7 @@ ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, 
 {
     ebpo_node_table *table = marked->table;
     marking *w = ebpo_alloc_zero(1, sizeof *w);
-    near_discs all = { 0, 0, { 0, 0 }, false };
+    near_discs all = { 0, 0, { 0, 0 }, false, -1 };
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
     w->holes = holes;

@@ -34,7 +34,7 @@ static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 /* Returns the maximum bytes that ebpo_holes_mark adds to the table of a whole model. */
 static inline uint64_t ebpo_holes_marks_max(const ebpo_info *info)
 {
-    return info->parts & EBPO_PART_BORDER ? (UINT64_C(1) << 17) + 320 * info->border_points : 0;
+    return info->parts & EBPO_PART_BORDER ? (UINT64_C(1) << 19) + 320 * info->border_points : 0;
 }
 
 /* Finds the nodes of a table in which all points have the same result, and marks all nodes of the

@@ -372,17 +372,18 @@ static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
         give_marked(context, marked, out);
         return;
     }
-    ebpo_cell cell = ebpo_cell_ancestor(
-        (ebpo_cell){ deepest, { position->at[0], position->at[1], position->at[2] } }, level);
-    ebpo_cell_bounds(&box, cell, low, high);
     int32_t winding = ebpo_marked_value(marked);
     if (mark == EBPO_MARK_LISTED) {
         near = &table->near[winding];
         winding = near->winding;
-        if (near->touched)
-            winding += ebpo_holes_list_crossings(holes, table, near, low, p);
-    } else {
-        winding += ebpo_holes_crossings(holes, low, p);
+        level = near->level;
+    }
+    if (!near || near->touched) {
+        ebpo_cell cell = ebpo_cell_ancestor(
+            (ebpo_cell){ deepest, { position->at[0], position->at[1], position->at[2] } }, level);
+        ebpo_cell_bounds(&box, cell, low, high);
+        winding += near ? ebpo_holes_list_crossings(holes, table, near, low, p)
+                        : ebpo_holes_crossings(holes, low, p);
     }
     decide_near(context, table, near, winding, p, out);
 }

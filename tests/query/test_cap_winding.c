@@ -488,7 +488,7 @@ static double check_variation(judge *j, const holed *h, const double q[3], const
     const double low[3] = { q[0] - half[0], q[1] - half[1], q[2] - half[2] },
                  high[3] = { q[0] + half[0], q[1] + half[1], q[2] + half[2] };
     const ebpo_cap_box box = ebpo_cap_box_of(low, high);
-    double bound = ebpo_cap_variation(&h->tree, &box, INFINITY), at_p;
+    double bound = ebpo_cap_variation(&h->tree, &box, NULL, 0, INFINITY), at_p;
     if (faces_near(h, q, half) || !judge_winding(j, &h->mesh, p))
         return INFINITY;
     at_p = mpf_get_d(j->angle);

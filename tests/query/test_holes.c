@@ -95,7 +95,7 @@ static double winding_by_sum(const ebpo_mesh *mesh, const double p[3], double *e
 /* ---- models ---- */
 
 /* Limit of the terms of sums of bounds for each leaf (ebpo_holes.terms). */
-enum { TERMS_OF_LEAF = 126 };
+enum { TERMS_OF_LEAF = 40 };
 
 enum { WIDE_FACES = 4000 };
 
