@@ -1,4 +1,6 @@
 /* Gets the instances of a scene as operands. */
+#include "core/strict_fp.h"
+
 #include <inttypes.h>
 
 #include <ebpo/boolean.h>
