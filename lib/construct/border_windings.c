@@ -165,21 +165,35 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
     return status;
 }
 
-/* Returns the area of a triangle, or INFINITY if the area is beyond the doubles. The coordinates
- * are scaled by a power of two, so no intermediate result overflows. */
+/* Multiplies two vectors by the same power of two, so that their greatest component is from 0.5 to
+ * 1. Returns the exponent of the greatest component before. */
+static int scale_vectors(double u[3], double v[3])
+{
+    double most = 0;
+    int power;
+    for (int k = 0; k < 3; k++)
+        most = fmax(most, fmax(fabs(u[k]), fabs(v[k])));
+    frexp(most, &power);
+    for (int k = 0; k < 3; k++) {
+        u[k] = ldexp(u[k], -power);
+        v[k] = ldexp(v[k], -power);
+    }
+    return power;
+}
+
+/* Returns the area of a triangle, or INFINITY if the area is beyond the doubles. The edges and
+ * their product are scaled by powers of two, so squares neither overflow nor underflow. */
 static double area_of(const double *const corner[3])
 {
-    double scaled[3][3], u[3], v[3], cross[3], most = 0;
-    int power;
-    for (int i = 0; i < 9; i++)
-        most = fmax(most, fabs(corner[i / 3][i % 3]));
-    frexp(most, &power);
-    for (int i = 0; i < 9; i++)
-        scaled[i / 3][i % 3] = ldexp(corner[i / 3][i % 3], -power);
-    ebpo_vec3_subtract(scaled[1], scaled[0], u);
-    ebpo_vec3_subtract(scaled[2], scaled[0], v);
+    double u[3], v[3], cross[3], none[3] = { 0, 0, 0 };
+    for (int k = 0; k < 3; k++) { /* quarters, because the difference of doubles may overflow */
+        u[k] = corner[1][k] / 4 - corner[0][k] / 4;
+        v[k] = corner[2][k] / 4 - corner[0][k] / 4;
+    }
+    int power = 2 * (2 + scale_vectors(u, v));
     ebpo_vec3_cross(u, v, cross);
-    return ldexp(ebpo_vec3_length(cross) / 2, 2 * power);
+    power += scale_vectors(cross, none);
+    return ldexp(ebpo_vec3_length(cross) / 2, power);
 }
 
 /* Sets the counts of the border's loops and points, and the area of the caps. */

@@ -89,24 +89,25 @@ typedef struct cap_list {
     bool no_memory; /* true: out of memory, so caps are missing */
 } cap_list;
 
-/* Returns the area of a triangle. The edges are divided by the longest of their components, so that
- * no product overflows. An area above the doubles is returned as INFINITY. */
+/* Returns the area of a triangle; INFINITY if it is beyond the doubles. Edges are multiplied by a
+ * power of two, so that no product overflows. Other factors would round them: in a narrow triangle,
+ * an error of an edge is a far greater error of the area. */
 static double area_of(const double *a, const double *b, const double *c)
 {
-    double u[3], v[3], most = 0, sum = 0;
+    double u[3], v[3], most = 0, x[3];
+    int power;
     for (int k = 0; k < 3; k++) {
         u[k] = b[k] / 4 - a[k] / 4;
         v[k] = c[k] / 4 - a[k] / 4;
         most = fmax(most, fmax(fabs(u[k]), fabs(v[k])));
     }
-    if (most == 0)
-        return 0;
+    frexp(most, &power);
     for (int k = 0; k < 3; k++) {
         int i = (k + 1) % 3, j = (k + 2) % 3;
-        double x = u[i] / most * (v[j] / most) - u[j] / most * (v[i] / most);
-        sum += x * x;
+        x[k] =
+            ldexp(u[i], -power) * ldexp(v[j], -power) - ldexp(u[j], -power) * ldexp(v[i], -power);
     }
-    return 8 * sqrt(sum) * most * most;
+    return ldexp(hypot(hypot(x[0], x[1]), x[2]), 2 * power + 3);
 }
 
 /* Lists the caps between the path of a loop from point `first` to point `last` and the straight

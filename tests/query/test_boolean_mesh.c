@@ -753,6 +753,39 @@ START_TEST(few_faces_near_drill)
 }
 END_TEST
 
+/* A sheet crosses a thin stack of plates everywhere. All faces of the plates are in all boxes that
+ * are not much smaller than the thickness of the stack; there are millions of such boxes. */
+START_TEST(long_faces_near_sheet)
+{
+    enum { PLATES = 600 };
+    const double thickness = 0x1p-20, slope = PLATES * 0x1p-21;
+    scene s = { .nodes = 3,
+                .node = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                          { EBPO_BOOLEAN_OPERAND, 1, 0, 0 },
+                          { EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 } } };
+    const double sheet_low[3] = { -1, -1, 0 }, sheet_high[3] = { 2, 2, thickness };
+    ebpo_mesh sheet = ebpo_test_box(sheet_low, sheet_high, 1), plates = { 0 };
+    for (uint32_t i = 0; i < PLATES; i++) {
+        const double low[3] = { 0, 0, i * thickness }, high[3] = { 1, 1, (i + 0.5) * thickness };
+        ebpo_mesh plate = ebpo_test_box(low, high, 1);
+        plates = i ? join_meshes(plates, plate) : plate;
+    }
+    for (uint64_t v = 0; v < sheet.vertex_count; v++)
+        sheet.xyz64[3 * v + 2] += slope * (sheet.xyz64[3 * v] + 1);
+    ebpo_base_face *near;
+    uint64_t count;
+    add_operand(&s, plates, moved_pose(0, 0, 0), 3);
+    add_operand(&s, sheet, moved_pose(0, 0, 0), 3);
+    ebpo_boolean *boolean = make_boolean(&s, 1);
+    ASSERT_OK(ebpo_base_faces_find(boolean, &near, &count, error));
+    ck_assert_uint_gt(count, s.model[0].mesh.face_count / 2);
+    ck_assert_uint_le(count, s.model[0].mesh.face_count);
+    free(near);
+    ebpo_boolean_free(boolean);
+    free_scene(&s);
+}
+END_TEST
+
 /* Refuses changes of two overlapping spheres: the other operand cuts both, or it is in both, or it
  * contains both, and the result has the reversed spheres. */
 START_TEST(refused_changes)
@@ -827,6 +860,7 @@ TEST_SUITE(boolean_mesh)
     tcase_add_test(tests, refused_regions);
     tcase_add_test(tests, changes);
     tcase_add_test(tests, few_faces_near_drill);
+    tcase_add_test(tests, long_faces_near_sheet);
     tcase_add_test(tests, refused_changes);
     tcase_add_test(tests, equal_for_any_threads);
     suite_add_tcase(suite, tests);

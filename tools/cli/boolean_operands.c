@@ -140,7 +140,7 @@ const char *boolean_operands_unit(const boolean_operands *o, const boolean_nodes
     for (uint32_t n = 0; n < nodes->count && !unit[0]; n++) {
         const boolean_input *in = o->input;
         uint32_t operand = nodes->node[n].left;
-        if (nodes->node[n].operation != EBPO_BOOLEAN_OPERAND)
+        if (nodes->node[n].operation != EBPO_BOOLEAN_OPERAND || o->operand[operand].pose.scale != 1)
             continue;
         while (operand >= in->first + in->count)
             in++;

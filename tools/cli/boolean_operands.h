@@ -39,8 +39,8 @@ int boolean_operands_open(boolean_operands *o, const char *name,
                           const ebpo_model_options *model_options, const remote_values *remote);
 void boolean_operands_close(boolean_operands *o);
 
-/* Returns the unit of the first operand of an expression that has a unit, or NULL. The models are
- * open. */
+/* Returns the unit of the first operand of an expression that has a unit and is not scaled by its
+ * pose, or NULL. The models are open. */
 const char *boolean_operands_unit(const boolean_operands *o, const boolean_nodes *nodes);
 
 /* Returns true, after an error message, if the output is a file of the operands: a model, a scene,

@@ -5,7 +5,8 @@
  *
  * The search begins with a box around the other operands. If the first operand has many faces in a
  * box, the box is halved, and a half that is outside all other operands is dropped. So a long
- * diagonal drill does not need all faces of its box. */
+ * diagonal drill does not need all faces of its box. Long faces are in many boxes, so halving ends
+ * when several times as many faces were read as the first operand has. */
 #include "core/strict_fp.h"
 
 #include "extras/boolean/base_faces.h"
@@ -19,8 +20,9 @@
 #include "extras/boolean/operand_mesh.h"
 #include "extras/boolean/world_cell.h"
 
-/* FACES: a box with more faces than this is halved. DEPTH: maximum number of halvings. */
-enum { FACES = 1 << 10, DEPTH = 24 };
+/* FACES: a box with more faces than this is halved. DEPTH: maximum number of halvings. Boxes are
+ * halved until READS * n + BOXES * FACES faces were read, if the first operand has n faces. */
+enum { FACES = 1 << 10, DEPTH = 24, READS = 4, BOXES = 64 };
 
 typedef struct gathering {
     const ebpo_boolean *boolean;
@@ -28,6 +30,7 @@ typedef struct gathering {
     ebpo_base_face *face;
     uint64_t count, capacity;
     uint64_t limit;            /* the search of a box stops when there are more faces than this */
+    uint64_t left;             /* number of faces to read until boxes are no longer halved */
     const ebpo_posing *posing; /* NULL: coordinates stay as they are */
     bool full;                 /* there was not enough memory for a face */
 } gathering;
@@ -133,7 +136,7 @@ static ebpo_status gather_in_box(gathering *g, const double box[2][3], int depth
     ebpo_status status = test_box(g, box, &out, &in, error);
     if (status != EBPO_OK || out)
         return status;
-    bool whole = in || depth == DEPTH || !halve_box(box, half);
+    bool whole = in || depth == DEPTH || g->left == 0 || !halve_box(box, half);
     g->limit = whole ? UINT64_MAX : before + FACES;
     ebpo_unpose_box(solid, box[0], box[1], min, max);
     status = ebpo_triangles_in_box(ebpo_boolean_context(g->boolean, 0, 0), min, max, take_triangles,
@@ -142,6 +145,8 @@ static ebpo_status gather_in_box(gathering *g, const double box[2][3], int depth
         return ebpo_fail_operand(solid->model, 0, &cause, error);
     if (g->full)
         return ebpo_fail_memory(error, (g->count + EBPO_TRIANGLES_MAX) * sizeof *g->face);
+    uint64_t read = g->count - before;
+    g->left -= read < g->left ? read : g->left;
     if (g->count <= g->limit)
         return EBPO_OK;
     g->count = before;
@@ -157,6 +162,7 @@ ebpo_status ebpo_base_faces_find(const ebpo_boolean *b, ebpo_base_face **out, ui
     gathering g = { .boolean = b, .posing = ebpo_moves_nothing(posing) ? NULL : posing };
     double box[2][3];
     g.others = ebpo_expression_operands(&b->expression) & ~UINT64_C(1);
+    g.left = READS * b->solid[0].model->info->face_count + BOXES * FACES;
     find_box(&g, box);
     ebpo_status status = g.others ? gather_in_box(&g, (const double(*)[3])box, 0, error) : EBPO_OK;
     if (g.count) {

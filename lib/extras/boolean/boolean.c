@@ -259,7 +259,8 @@ static ebpo_status add_half_spaces(ebpo_boolean *b, const ebpo_boolean_options *
 }
 
 /* Fails if two operands have different units. Units are texts that the user chose. An operand
- * without a unit may be combined with every unit. */
+ * without a unit may be combined with every unit, and so may an operand that its pose scales: the
+ * pose may convert its unit into the unit of the world. */
 static ebpo_status check_units(const ebpo_boolean *b, ebpo_error *error)
 {
     const char *unit = "";
@@ -268,12 +269,12 @@ static ebpo_status check_units(const ebpo_boolean *b, ebpo_error *error)
         const ebpo_model *model = b->solid[i].model;
         const char *own = model->info->unit;
         ebpo_error cause = EBPO_ERROR_INIT;
-        if (!(used >> i & 1) || !own[0])
+        if (!(used >> i & 1) || !own[0] || b->pose[i].scale != 1)
             continue;
         if (unit[0] && strcmp(unit, own) != 0) {
             ebpo_fail(&cause, EBPO_E_ARGUMENT,
                       "the unit is %s, but another operand has the unit %s; convert a model again "
-                      "with the same unit",
+                      "with the same unit, or scale it by its pose",
                       own, unit);
             return ebpo_fail_operand(model, i, &cause, error);
         }

@@ -104,11 +104,11 @@ typedef struct ebpo_boolean ebpo_boolean;
  *
  * EBPO_E_ARGUMENT: an index is out of range; a node refers to itself or to a later node; an
  * operation, box, plane or pose (ebpo_pose_check) is not valid; there is a complement, but no box;
- * or operands that the expression uses have different units (an operand without a unit may be
- * combined with every unit). EBPO_E_LIMIT: there are no operands or nodes, or too many.
- * EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an operand's file has no mesh.
- * EBPO_E_IO: `temp_dir` cannot hold files. Messages give the index of the node, or the number of
- * the operand (from 1 on) and its file.
+ * or operands that the expression uses have different units (an operand without a unit, or with
+ * another scale than 1 in its pose, may be combined with every unit). EBPO_E_LIMIT: there are no
+ * operands or nodes, or too many. EBPO_E_NOT_SOLID: an operand is a surface. EBPO_E_ABSENT: an
+ * operand's file has no mesh. EBPO_E_IO: `temp_dir` cannot hold files. Messages give the index of
+ * the node, or the number of the operand (from 1 on) and its file.
  *
  * Threads: any.
  */

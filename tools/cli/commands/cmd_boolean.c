@@ -474,9 +474,11 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
         return EXIT_OK;
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;
-    model_options->memory /= 4 * count;
-    if (model_options->memory < least_memory)
-        model_options->memory = least_memory;
+    if (model_options->memory) {
+        model_options->memory /= 4 * count;
+        if (model_options->memory < least_memory)
+            model_options->memory = least_memory;
+    }
     return memory_new(out, &memory, &error) == EBPO_OK ? EXIT_OK
                                                        : command_failed("boolean", &error);
 }
