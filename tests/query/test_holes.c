@@ -321,6 +321,19 @@ START_TEST(test_winding_numbers_on_both_sides_of_cap)
 }
 END_TEST
 
+/* The squares of the caps' areas underflow. */
+START_TEST(test_tiny_surface_matches_sums_over_faces)
+{
+    uint64_t state = 25;
+    tally all = { { 0 } };
+    ebpo_mesh mesh = holed_torus(&state, 20, 0);
+    for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
+        mesh.xyz64[i] *= 0x1p-280;
+    check_model(mesh, EBPO_RULE_NONZERO, 0.5, 100, 26, &all);
+    ck_assert_uint_gt(all.of[EBPO_IN], 0);
+}
+END_TEST
+
 /* Makes the three faces of a cube of size 2 that touch the origin. */
 static ebpo_mesh three_cube_faces(void)
 {
@@ -861,6 +874,7 @@ TEST_SUITE(holes)
     tcase_add_loop_test(shapes, test_few_holes_match_sums_over_faces, 0, EBPO_RULE_POSITIVE + 1);
     tcase_add_loop_test(shapes, test_envelopes_contain_inside, 0, 3);
     tcase_add_test(shapes, test_winding_numbers_on_both_sides_of_cap);
+    tcase_add_test(shapes, test_tiny_surface_matches_sums_over_faces);
     tcase_add_test(shapes, test_ties_are_counted);
     tcase_add_test(shapes, test_invalid_queries_are_refused);
     tcase_add_test(shapes, test_border_is_added_to_file);
