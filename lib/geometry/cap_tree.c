@@ -59,15 +59,16 @@ static void add_part(ebpo_cap_node *n, const ebpo_cap_node *part)
 }
 
 /* Sets the sums of the node to the sums of the triangle (from, m, to). The rounding error of the
- * triangle's vector area is below 2^-49 times the product of two edges. */
+ * triangle's vector area is below 2^-49 times the product of two edges. The square of an area may
+ * underflow, so lengths are scaled. */
 static void set_triangle(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t m)
 {
     double u[3], v[3], cross[3], weight = n->weight;
     ebpo_vec3_subtract(t->position[m], t->position[n->from], u);
     ebpo_vec3_subtract(t->position[n->to], t->position[n->from], v);
     ebpo_vec3_cross(u, v, cross);
-    n->slack = weight * 0x1p-48 * ebpo_vec3_length(u) * ebpo_vec3_length(v);
-    n->area = weight * ebpo_vec3_length(cross) / 2 * ENLARGE + n->slack;
+    n->slack = weight * 0x1p-48 * ebpo_vec3_scaled_length(u) * ebpo_vec3_scaled_length(v);
+    n->area = weight * ebpo_vec3_scaled_length(cross) / 2 * ENLARGE + n->slack;
     n->most = weight * EBPO_PI_HIGH * ENLARGE;
     for (int k = 0; k < 3; k++)
         n->vector[k] = weight * cross[k] / 2;

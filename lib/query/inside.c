@@ -347,14 +347,15 @@ static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint3
 }
 
 /* In a surface, classifies a point in a white node with the mark EBPO_MARK_IN or EBPO_MARK_OUT. */
-static inline void give_marked(const ebpo_context *context, int32_t marked, ebpo_inside_result *out)
+static inline void give_marked(int32_t marked, ebpo_inside_result *out)
 {
     bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
-    *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT,
-                                 context->undecided ? ebpo_marked_value(marked) : in, 0 };
+    *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, in, 0 };
 }
 
-/* In a surface, classifies a point in a white node with any mark (ebpo_uniform_mark). */
+/* In a surface, classifies a point in a white node with any mark (ebpo_uniform_mark). If
+ * ebpo_context.undecided is true, computes the winding number at the point. It may differ from the
+ * winding number at the cell's lowest corner, because caps may cross the cell. */
 static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
                                                     const ebpo_node_table *table, uint32_t entry,
                                                     const ebpo_position *position, int level,
@@ -368,8 +369,8 @@ static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
     const ebpo_holes *holes = context->model->holes;
     const ebpo_near_cell *near = NULL;
     double low[3], high[3];
-    if (mark <= EBPO_MARK_IN) {
-        give_marked(context, marked, out);
+    if (mark <= EBPO_MARK_IN && !context->undecided) {
+        give_marked(marked, out);
         return;
     }
     int32_t winding = ebpo_marked_value(marked);
@@ -396,8 +397,8 @@ static inline void inside_uniform(const ebpo_context *context, const ebpo_node_t
     int32_t value = ebpo_entry_winding(entry);
     if (!context->model->holes)
         give_winding(context, value, out);
-    else if (ebpo_entry_mark(value) <= EBPO_MARK_IN)
-        give_marked(context, value, out);
+    else if (ebpo_entry_mark(value) <= EBPO_MARK_IN && !context->undecided)
+        give_marked(value, out);
     else
         inside_marked(context, table, entry, position, level, p, out);
 }

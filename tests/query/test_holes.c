@@ -304,6 +304,36 @@ START_TEST(test_few_holes_match_sums_over_faces)
 }
 END_TEST
 
+/* ebpo_winding is right in cells that caps cross and in which all points have the same result. */
+START_TEST(test_winding_numbers_on_both_sides_of_cap)
+{
+    uint64_t state = 24, points = ebpo_test_scaled(2000) + 100;
+    holed h;
+    holed_make(&h, without_slice(3, 3.5, 6), EBPO_RULE_NONZERO, 0.125);
+    for (uint64_t i = 0; i < points; i++) {
+        double p[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = 1 + k + 0.8 * (2 * ebpo_test_random_unit(&state) - 1);
+        p[2] += 0.5; /* the cap is near this height */
+        check_point(&h, p, EBPO_RULE_NONZERO, 0.125);
+    }
+    holed_free(&h);
+}
+END_TEST
+
+/* The squares of the caps' areas underflow. */
+START_TEST(test_tiny_surface_matches_sums_over_faces)
+{
+    uint64_t state = 25;
+    tally all = { { 0 } };
+    ebpo_mesh mesh = holed_torus(&state, 20, 0);
+    for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
+        mesh.xyz64[i] *= 0x1p-280;
+    check_model(mesh, EBPO_RULE_NONZERO, 0.5, 100, 26, &all);
+    ck_assert_uint_gt(all.of[EBPO_IN], 0);
+}
+END_TEST
+
 /* Makes the three faces of a cube of size 2 that touch the origin. */
 static ebpo_mesh three_cube_faces(void)
 {
@@ -843,6 +873,8 @@ TEST_SUITE(holes)
     tcase_add_loop_test(shapes, test_surfaces_match_sums_over_faces, 0, 9);
     tcase_add_loop_test(shapes, test_few_holes_match_sums_over_faces, 0, EBPO_RULE_POSITIVE + 1);
     tcase_add_loop_test(shapes, test_envelopes_contain_inside, 0, 3);
+    tcase_add_test(shapes, test_winding_numbers_on_both_sides_of_cap);
+    tcase_add_test(shapes, test_tiny_surface_matches_sums_over_faces);
     tcase_add_test(shapes, test_ties_are_counted);
     tcase_add_test(shapes, test_invalid_queries_are_refused);
     tcase_add_test(shapes, test_border_is_added_to_file);
