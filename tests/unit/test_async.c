@@ -126,6 +126,8 @@ START_TEST(test_wrong_supplies_are_rejected)
     ck_assert(supply(a, 1001, 0, NULL) == EBPO_E_ARGUMENT);
     ck_assert(supply(a, UINT64_MAX, 2, NULL) == EBPO_E_ARGUMENT);
     ck_assert(ebpo_async_supply(a, 0, 4, NULL, NULL, &error) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_async_source(a, NULL, &error) == EBPO_E_ARGUMENT);
+    ck_assert(ebpo_async_source(NULL, &(ebpo_source)EBPO_SOURCE_INIT, &error) == EBPO_E_ARGUMENT);
     ck_assert(supply(a, 0, 100, "v1") == EBPO_OK && read_range(&source, 0, 100) == EBPO_OK);
     if (_i) /* another version, or other bytes */
         ck_assert(supply(a, 200, 10, "v2") == EBPO_E_IO);
