@@ -195,6 +195,9 @@ def result(root, command, path):
 
 def serve_both(root, a, b, change, name, must_go_on):
     path = os.path.join(root, "model.ebpo.h5")
+    size = max(map(os.path.getsize, (a, b)))
+    for which in (a, b):  # of equal size: an overwritten file never ends with bytes of the other one
+        os.truncate(which, size)
     shutil.copy(a, path)
     stop = threading.Event()
 
@@ -215,6 +218,8 @@ def serve_both(root, a, b, change, name, must_go_on):
     thread = threading.Thread(target=writer)
     thread.start()
     for command, text in COMMANDS.items():
+        if command == "levels" and not must_go_on:
+            continue  # no checksum covers the whole header: docs/develop/threats.md
         for _ in range(max(1, round(TURNS * SCALE / 10)) if SCALE < 1 else TURNS):
             code, made, said = result(root, text, path)
             if code == 0:
