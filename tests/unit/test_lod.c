@@ -260,6 +260,29 @@ START_TEST(test_lod_leaves_without_faces_inherit_planes)
 }
 END_TEST
 
+/* The hull of a convex solid in a cell is the solid there, so the sum over any level's cells is the
+ * volume of the solid. */
+START_TEST(test_limit_of_convex_solid_is_its_volume)
+{
+    static const double low[3] = { 0, 0, 0 }, high[3] = { 3, 2, 1 };
+    ebpo_mesh mesh = _i ? ebpo_test_sphere(low, 1, 2) : ebpo_test_box(low, high, 4);
+    double right = mesh_volume(&mesh);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_limit limit = EBPO_LIMIT_INIT;
+    ebpo_file *file = build(mesh, DEFAULT, 4);
+    for (int level = 0; level < ebpo_file_info(file)->level_count; level++) {
+        ebpo_status status = ebpo_limit_level(file, level, NULL, &limit, &error);
+        if (status == EBPO_E_ABSENT) /* without qhull */
+            break;
+        ck_assert_msg(status == EBPO_OK, "%s", error.message);
+        ck_assert_msg(fabs(limit.volume - right) <= 1e-6 * right, "level %d: %.17g, not %.17g",
+                      level, limit.volume, right);
+        ck_assert(limit.hulls > 0 && limit.gray_volume <= limit.volume);
+    }
+    ebpo_close(file);
+}
+END_TEST
+
 START_TEST(test_lod_missing_level_is_refused)
 {
     ebpo_file *file = build(ebpo_test_make("cube"), DEFAULT, 4);
@@ -315,6 +338,7 @@ TEST_SUITE(lod)
     tcase_add_test(cases, test_cell_faces_are_omitted);
     tcase_add_test(cases, test_lod_envelopes_are_in_octcode_order);
     tcase_add_test(cases, test_lod_leaves_without_faces_inherit_planes);
+    tcase_add_loop_test(cases, test_limit_of_convex_solid_is_its_volume, 0, 2);
     tcase_add_test(cases, test_lod_missing_level_is_refused);
     tcase_add_test(cases, test_lod_cancel_leaves_nothing);
     suite_add_tcase(suite, cases);
