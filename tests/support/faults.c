@@ -116,12 +116,15 @@ static module_kind who(const void *address)
 
 static atomic_bool armed, paused;
 static unsigned wanted;
-static uint64_t failing;
+static _Atomic uint64_t failing;
 static bool onward, foreign;
 static int error_number;
 static uint64_t own_counts[2];
 static _Atomic uint64_t *counts = (_Atomic uint64_t *)own_counts; /* calls, failed */
 static __thread bool busy;
+
+enum { PLACES = 1 << 16 };
+static _Atomic uint64_t *places; /* hash table of the places that have failed; 0: empty */
 
 /* Returns the module on whose behalf the C library makes the call. */
 static module_kind behind(void)
@@ -137,6 +140,33 @@ static module_kind behind(void)
     return NEUTRAL;
 }
 
+/* Returns true if no call from this place has failed, and records the place: the kind of the call,
+ * and the innermost functions of this project that lead to it. */
+static bool is_new_place(unsigned kind)
+{
+    enum { DEPTH = 16, FUNCTIONS = 3 };
+    void *frame[DEPTH];
+    busy = true;
+    int depth = backtrace(frame, DEPTH), used = 0;
+    busy = false;
+    uint64_t hash = kind;
+    for (int i = 0; i < depth && used < FUNCTIONS; i++)
+        if (who(frame[i]) != NEUTRAL) {
+            hash = (hash ^ (uintptr_t)frame[i]) * 0x9e3779b97f4a7c15u;
+            hash ^= hash >> 29;
+            used++;
+        }
+    hash |= 1;
+    for (uint64_t i = hash >> 20, tries = 0; tries < PLACES; i++, tries++) {
+        uint64_t found = 0;
+        if (atomic_compare_exchange_strong(&places[i % PLACES], &found, hash))
+            return true;
+        if (found == hash)
+            return false;
+    }
+    return false;
+}
+
 static bool fails(unsigned kind, const void *caller)
 {
     if (!atomic_load_explicit(&armed, memory_order_relaxed) || !(wanted & kind) || paused || busy)
@@ -147,7 +177,11 @@ static bool fails(unsigned kind, const void *caller)
     if (from == NEUTRAL || (from == FOREIGN) != foreign)
         return false;
     uint64_t n = atomic_fetch_add(&counts[0], 1) + 1;
-    bool now = failing && (n == failing || (onward && n > failing));
+    uint64_t first = atomic_load(&failing);
+    if (first == FAULTS_NEW_PLACE && is_new_place(kind) &&
+        atomic_compare_exchange_strong(&failing, &first, n))
+        first = n;
+    bool now = first && (n == first || (onward && n > first));
     if (now) {
         atomic_fetch_add(&counts[1], 1);
         errno = error_number;
@@ -174,20 +208,21 @@ void faults_begin(unsigned kinds, uint64_t n, bool all_after, int error)
 uint64_t faults_end(void)
 {
     armed = false;
-    return atomic_load(&counts[0]);
+    return atomic_load(&counts[1]) ? atomic_load(&failing) : 0;
 }
 
 void faults_pause(void) { paused = true; }
 void faults_resume(void) { paused = false; }
 
-/* Shares the counts with child processes. */
-static void share_counts(void)
+/* Returns zeroed memory that is shared with child processes. */
+static void *shared(size_t size)
 {
     REAL(mmap64);
-    void *there = real.mmap64(NULL, 16, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    void *there =
+        real.mmap64(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
     if (there == MAP_FAILED)
         abort();
-    counts = there;
+    return there;
 }
 
 static void map_counts(const char *path)
@@ -215,7 +250,8 @@ __attribute__((constructor)) static void begin(void)
     if (path)
         map_counts(path);
     else
-        share_counts();
+        counts = shared(2 * sizeof *counts);
+    places = shared(PLACES * sizeof *places);
     foreign = getenv("EBPO_TEST_FAULT_FOREIGN") != NULL;
     if (!order)
         return;

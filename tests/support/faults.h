@@ -34,10 +34,14 @@ enum {
     FAULT_KINDS = 13
 };
 
+/* Number of the first call of a new place: no call with the same innermost functions has failed in
+ * this process or in another one with the same parent. */
+#define FAULTS_NEW_PLACE UINT64_MAX
+
 /* Lets the n-th call of these kinds from now on fail (1: the next call; 0: none), and with `onward`
- * all later calls. Resets the count. */
+ * all later calls. */
 __attribute__((weak)) void faults_begin(unsigned kinds, uint64_t n, bool onward, int error);
-/* Ends all failures. Returns the number of calls. */
+/* Ends all failures. Returns the number of the first call that has failed, or 0. */
 __attribute__((weak)) uint64_t faults_end(void);
 /* Suspends failing and counting. */
 __attribute__((weak)) void faults_pause(void);

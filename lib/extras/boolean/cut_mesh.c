@@ -150,8 +150,10 @@ static ebpo_status cut_all(cutting *c, const ebpo_progress *progress, ebpo_error
             status = ebpo_parallel_for(faces->boolean->threads, NULL, count, GRAIN, cut_some, c,
                                        NULL, stage, error);
         if (status == EBPO_OK && !merge_faces(c, begin, end))
-            status = ebpo_fail(error, EBPO_E_LIMIT,
-                               "memory is short, or the cut faces have more than 2^31 - 1 parts");
+            status = c->cut->count >= INT32_MAX || c->cut->set.count > INT32_MAX
+                         ? ebpo_fail(error, EBPO_E_LIMIT,
+                                     "the cut faces have more than 2^31 - 1 parts or points")
+                         : ebpo_fail_memory(error, c->cut->count * sizeof *c->cut->triangle);
         for (uint64_t i = 0; i < count; i++)
             ebpo_face_pieces_free(&c->pieces[i]);
     }
