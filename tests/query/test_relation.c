@@ -436,6 +436,10 @@ START_TEST(test_relation_of_grid_surfaces)
 }
 END_TEST
 
+/* Parts that overlap, so that only points of pieces of faces show a common point. */
+START_TEST(test_relation_by_pieces_of_faces) { check_random(13, true, true); }
+END_TEST
+
 /* --- named cases --- */
 
 #define BOX(x, y, z, X, Y, Z, sign)    \
@@ -587,6 +591,7 @@ TEST_SUITE(relation)
     tcase_set_timeout(tests, 900);
     tcase_add_loop_test(tests, test_relation_known_cases, 0, KNOWN);
     tcase_add_loop_test(tests, test_relation_of_grid_solids, 0, RANDOM);
+    tcase_add_test(tests, test_relation_by_pieces_of_faces);
     tcase_add_loop_test(tests, test_relation_of_grid_surfaces, 0, RANDOM);
     tcase_add_loop_test(tests, test_relation_of_all_solid_kinds, 0, 24);
     tcase_add_test(tests, test_relation_is_open_after_deadline);
