@@ -623,6 +623,7 @@ def check_border(file):
     rows = file["/border/loops"][...].astype("i8") if loops else np.zeros((0, 2), "i8")
     points = vertices(file["/border/points"]).astype("f8") + 0.0 if loops else np.zeros((0, 3))
     assert (rows[:, 0] >= 3).all() and (rows[:, 1] >= 1).all(), "a loop"
+    assert sum(n * weight for n, weight in rows.tolist()) <= 1 << 28, "weights"
     assert rows[:, 0].sum() == count and rows[:, 0].max(initial=0) == one(attrs["border_longest"]), "loops and counts"
     assert np.isfinite(points).all(), "a coordinate"
     if "pruned" in parts:

@@ -25,6 +25,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/fp_env.h"
+#include "core/parallel.h"
 #include "core/workspace.h"
 #include "format/border_loops.h"
 #include "format/write_file.h"
@@ -34,7 +35,10 @@
 #include "mesh/border.h"
 #include "mesh/mesh_parts.h"
 
-enum { BUFFER_FACES = 256 }; /* number of faces whose crossings are computed at a time */
+enum {
+    BUFFER_FACES = 256,   /* number of faces whose crossings are computed at a time */
+    PROGRESS_NODES = 4096 /* number of white nodes and leaves between two reports of progress */
+};
 
 typedef struct winding_walk {
     ebpo_tree *tree;
@@ -45,6 +49,10 @@ typedef struct winding_walk {
     uint64_t group[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX], white[EBPO_LEVELS_MAX],
         ref[EBPO_LEVELS_MAX];
     bool agree; /* so far, all paths to a corner gave the same winding number */
+    const ebpo_progress *progress;
+    uint64_t done, total; /* number of visited white nodes and leaves; of all */
+    ebpo_status status;   /* of the last report of progress */
+    ebpo_error *error;
     ebpo_triangle buffer[BUFFER_FACES];
 } winding_walk;
 
@@ -67,6 +75,16 @@ static void add_faces(winding_walk *w, ebpo_cell cell, const uint32_t *faces, ui
         for (int i = 0; i < 8; i++)
             delta[i] += part[i];
     }
+}
+
+/* Counts a white node or a leaf. Now and then, reports progress and releases pages. */
+static void count_node(winding_walk *w)
+{
+    if (w->done++ % PROGRESS_NODES)
+        return;
+    ebpo_release_pages(w->tree->workspace);
+    if (!ebpo_progress_step(w->progress, "border", w->done - 1, w->total, w->error))
+        w->status = EBPO_E_CANCELLED;
 }
 
 /* Stores the winding number of a leaf, and adds its corner differences to `delta`. */
@@ -112,11 +130,16 @@ static void visit_gray(winding_walk *w, ebpo_cell cell, int32_t winding, int32_t
 }
 
 /* Stores the winding numbers of a node and of all nodes below, and sets `delta` to the node's
- * corner differences. `winding`: winding number at the node's lowest corner. */
+ * corner differences. `winding`: winding number at the node's lowest corner. Does nothing after a
+ * cancellation. */
 static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int32_t winding,
                        int32_t delta[8])
 {
     memset(delta, 0, 8 * sizeof *delta);
+    if (type != EBPO_GRAY)
+        count_node(w);
+    if (w->status != EBPO_OK)
+        return;
     if (type == EBPO_GRAY) {
         visit_gray(w, cell, winding, delta);
     } else if (type == EBPO_LEAF) {
@@ -128,15 +151,19 @@ static void visit_node(winding_walk *w, ebpo_cell cell, ebpo_node_type type, int
 }
 
 /* Computes the winding numbers of all white nodes and leaves. Returns EBPO_E_NOT_SOLID if the caps
- * do not close the mesh. */
-static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebpo_error *error)
+ * do not close the mesh, EBPO_E_CANCELLED. */
+static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps,
+                                 const ebpo_progress *progress, ebpo_error *error)
 {
     winding_walk *w = ebpo_alloc_zero(1, sizeof *w);
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
-    *w = (winding_walk){
-        .tree = tree, .box = ebpo_root_box(&tree->info), .caps = caps, .agree = true
-    };
+    *w = (winding_walk){ .tree = tree,
+                         .box = ebpo_root_box(&tree->info),
+                         .caps = caps,
+                         .agree = true,
+                         .progress = progress,
+                         .error = error };
     ebpo_status status = EBPO_OK;
     for (int i = 0; i < tree->info.level_count && status == EBPO_OK; i++) {
         ebpo_level *l = &tree->level[i];
@@ -150,6 +177,7 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
         if ((l->leaf_count && !l->leaf_winding) || (l->white_count && !l->white_winding))
             status = ebpo_workspace_fail(l->workspace,
                                          (l->leaf_count + l->white_count) * sizeof(int32_t), error);
+        w->total += l->leaf_count + l->white_count;
     }
     int32_t delta[8];
     if (status == EBPO_OK) {
@@ -157,7 +185,8 @@ static ebpo_status make_windings(ebpo_tree *tree, const ebpo_cap_tree *caps, ebp
                    delta);
         for (int i = 0; i < 8; i++)
             w->agree = w->agree && delta[i] == 0;
-        if (!w->agree)
+        status = w->status;
+        if (status == EBPO_OK && !w->agree)
             status = ebpo_fail(error, EBPO_E_NOT_SOLID,
                                "winding numbers disagree: the caps do not close the mesh");
     }
@@ -226,17 +255,22 @@ ebpo_status ebpo_build_find_border(ebpo_border_loops *out, const ebpo_mesh *mesh
         return status;
     *out = (ebpo_border_loops){ .loop_count = border.loop_count };
     out->point_count = border.loop_count ? border.first[border.loop_count] : 0;
+    uint64_t edges = 0; /* sum of points times weight */
     out->loop = ebpo_alloc(out->loop_count + 1, 2 * sizeof *out->loop);
     out->point = ebpo_alloc(out->point_count + 1, 3 * sizeof *out->point);
-    if (out->point_count > INT32_MAX)
-        status = ebpo_fail(error, EBPO_E_LIMIT, "%llu border edges, but 2^31 - 1 is the limit",
-                           (unsigned long long)out->point_count);
-    else if (!out->loop || !out->point)
+    if (!out->loop || !out->point)
         status = ebpo_fail_memory(error, out->point_count * 3 * sizeof *out->point);
     for (uint64_t i = 0; i < out->loop_count && status == EBPO_OK; i++) {
         out->loop[2 * i] = (uint32_t)(border.first[i + 1] - border.first[i]);
         out->loop[2 * i + 1] = border.weight[i];
+        edges += (uint64_t)out->loop[2 * i] * border.weight[i];
     }
+    if (status == EBPO_OK && edges > EBPO_BORDER_WEIGHT_MAX)
+        status = ebpo_fail(error, EBPO_E_LIMIT,
+                           "the border has %" PRIu64
+                           " edges, counted by their weights, but %d is the limit; build without "
+                           "the border",
+                           edges, EBPO_BORDER_WEIGHT_MAX);
     uint64_t bytes = out->point_count * EBPO_CAPS_BYTES,
              memory = mesh->workspace ? ebpo_workspace_memory(mesh->workspace) : 0;
     if (status == EBPO_OK && memory && bytes > memory / 2)
@@ -251,14 +285,15 @@ ebpo_status ebpo_build_find_border(ebpo_border_loops *out, const ebpo_mesh *mesh
     return status;
 }
 
-ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
+ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, const ebpo_progress *progress,
+                              ebpo_error *error)
 {
     ebpo_cap_tree caps = { .node = NULL };
     ebpo_status status = ebpo_build_find_border(&tree->border, &tree->mesh, threads, error);
     if (status == EBPO_OK)
         status = ebpo_cap_tree_of_loops(&caps, &tree->border, error);
     if (status == EBPO_OK)
-        status = make_windings(tree, &caps, error);
+        status = make_windings(tree, &caps, progress, error);
     if (status == EBPO_OK) {
         measure_border(&tree->info, &caps, &tree->border);
         tree->info.parts |= EBPO_PART_BORDER;
@@ -271,12 +306,13 @@ ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *err
 
 /* Adds the border to a tree of a surface that has the mesh and no pruned nodes, unless the tree
  * already has its border. */
-static ebpo_status add_border(ebpo_tree *tree, unsigned threads, ebpo_error *error)
+static ebpo_status add_border(ebpo_tree *tree, const ebpo_write_options *options, ebpo_error *error)
 {
     const ebpo_info *info = &tree->info;
     bool possible = !info->solid && !info->pruned && info->parts & EBPO_PART_MESH;
-    return possible && !(info->parts & EBPO_PART_BORDER) ? ebpo_build_border(tree, threads, error)
-                                                         : EBPO_OK;
+    return possible && !(info->parts & EBPO_PART_BORDER)
+               ? ebpo_build_border(tree, options->threads, &options->progress, error)
+               : EBPO_OK;
 }
 
 ebpo_status ebpo_file_add_border(const ebpo_file *file, const char *path,

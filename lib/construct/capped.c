@@ -22,6 +22,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/workspace.h"
 #include "geometry/cap_cells.h"
 
 enum {
@@ -31,6 +32,7 @@ enum {
     LIST_MAX = 1024,
     ENTRIES_PER_EDGE = 64,
     PROGRESS_CELLS = 2048, /* number of divided cells between two reports of progress */
+    RELEASE_CELLS = 64,    /* number of divided cells between two releases of pages */
     DETAIL_LEVELS = 3
 };
 
@@ -51,6 +53,7 @@ typedef struct cap_level {
 } cap_level;
 
 struct ebpo_capped {
+    ebpo_workspace *workspace; /* owns the lists and the cap cells */
     const ebpo_box *box;
     ebpo_cap_rule rule;
     ebpo_cap_tree caps;
@@ -90,7 +93,8 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
             c->lists.count = child.begin;
             continue;
         }
-        if (!ebpo_grow(&next->cell, &next->capacity, next->count + 1, sizeof *next->cell))
+        if (!ebpo_array_grow_late(c->workspace, &next->cell, &next->capacity, next->count + 1,
+                                  sizeof *next->cell))
             return false;
         next->cell[next->count++] = child;
     }
@@ -99,7 +103,7 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
 
 static ebpo_status fail_lists(const ebpo_capped *c, ebpo_error *error)
 {
-    return ebpo_fail_memory(error, c->lists.count * sizeof *c->lists.entry);
+    return ebpo_workspace_fail(c->workspace, c->lists.count * sizeof *c->lists.entry, error);
 }
 
 /* Divides the cells of level c->deepest. `tests`: number of tests before; `tests_max`: limit. */
@@ -116,6 +120,8 @@ static ebpo_status divide_level(ebpo_capped *c, ebpo_cap_front *front,
         if (divided % PROGRESS_CELLS == 0 &&
             !ebpo_progress_step(progress, "border", tests + 8 * divided, tests_max, error))
             return EBPO_E_CANCELLED;
+        if (divided % RELEASE_CELLS == 0)
+            ebpo_release_pages(c->workspace);
         if (!divide_cell(c, front, &l->cell[i], list_max, l + 1))
             return fail_lists(c, error);
         divided++;
@@ -128,8 +134,9 @@ static ebpo_status find_cells(ebpo_capped *c, ebpo_cap_front *front, const ebpo_
                               int max_level, uint64_t tests_max, ebpo_error *error)
 {
     cap_level *root = &c->level[0];
-    if (!ebpo_grow(&root->cell, &root->capacity, 1, sizeof *root->cell) ||
-        !ebpo_grow(&c->lists.entry, &c->lists.capacity, 1, sizeof *c->lists.entry))
+    if (!ebpo_array_grow_late(c->workspace, &root->cell, &root->capacity, 1, sizeof *root->cell) ||
+        !ebpo_array_grow_late(c->workspace, &c->lists.entry, &c->lists.capacity, 1,
+                              sizeof *c->lists.entry))
         return fail_lists(c, error);
     c->lists.entry[c->lists.count++] = 0; /* the root of the tree of caps: all caps */
     root->cell[root->count++] = (cap_cell){ .code = 1, .end = 1 };
@@ -175,6 +182,7 @@ ebpo_status ebpo_capped_make(ebpo_builder *b, const ebpo_border_loops *loops, eb
     ebpo_status status = c && front ? ebpo_cap_tree_of_loops(&c->caps, loops, error)
                                     : ebpo_fail_memory(error, sizeof *c + sizeof *front);
     if (status == EBPO_OK) {
+        c->workspace = c->lists.workspace = b->workspace;
         c->box = &b->box;
         c->rule = (ebpo_cap_rule){ (uint8_t)b->options->rule, threshold };
         status = find_cells(c, front, &b->options->progress, b->max_level,
@@ -194,8 +202,8 @@ void ebpo_capped_free(ebpo_capped *capped)
     if (!capped)
         return;
     for (int i = 0; i < EBPO_LEVELS_MAX; i++)
-        free(capped->level[i].cell);
-    free(capped->lists.entry);
+        ebpo_array_free(capped->workspace, capped->level[i].cell);
+    ebpo_array_free(capped->workspace, capped->lists.entry);
     ebpo_cap_tree_free(&capped->caps);
     free(capped);
 }

@@ -326,7 +326,7 @@ static ebpo_status run_stages(ebpo_builder *b, ebpo_mesh *mesh, ebpo_tree *out, 
     if (status == EBPO_OK && border && !ebpo_progress_stage(&b->options->progress, "border", error))
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK && border)
-        status = ebpo_build_border(out, b->threads, error);
+        status = ebpo_build_border(out, b->threads, &b->options->progress, error);
     return status == EBPO_OK && b->options->parts & EBPO_PART_SURFACE
                ? ebpo_build_surface(out, b->threads, &b->options->progress, error)
                : status;

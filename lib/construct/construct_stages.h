@@ -69,9 +69,11 @@ EBPO_MUST_USE ebpo_status ebpo_build_gray_colours(const ebpo_builder *b, ebpo_tr
  * EBPO_E_IO, EBPO_E_LIMIT. `out` must be freed, also on failure. */
 EBPO_MUST_USE ebpo_status ebpo_build_find_border(ebpo_border_loops *out, const ebpo_mesh *mesh,
                                                  unsigned threads, ebpo_error *error);
-/* Adds the part EBPO_PART_BORDER to a surface with levels and mesh. Returns EBPO_E_MEMORY,
- * EBPO_E_IO, EBPO_E_LIMIT. */
-EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads, ebpo_error *error);
+/* Adds the part EBPO_PART_BORDER to a surface with levels and mesh. Reports progress as the stage
+ * "border"; `progress` may be NULL. Returns EBPO_E_MEMORY, EBPO_E_IO, EBPO_E_LIMIT,
+ * EBPO_E_CANCELLED. */
+EBPO_MUST_USE ebpo_status ebpo_build_border(ebpo_tree *tree, unsigned threads,
+                                            const ebpo_progress *progress, ebpo_error *error);
 
 /* --- surface.c (format-spec/surface.md) --- */
 

@@ -920,12 +920,13 @@ ebpo_status ebpo_build_surface(ebpo_tree *tree, unsigned threads, const ebpo_pro
 
 /* Adds the surface to a tree that has the mesh and no pruned nodes, unless the tree already has its
  * surface. */
-static ebpo_status add_surface(ebpo_tree *tree, unsigned threads, ebpo_error *error)
+static ebpo_status add_surface(ebpo_tree *tree, const ebpo_write_options *options,
+                               ebpo_error *error)
 {
     const ebpo_info *info = &tree->info;
     bool possible = !info->pruned && info->parts & EBPO_PART_MESH;
     return possible && !(info->parts & EBPO_PART_SURFACE)
-               ? ebpo_build_surface(tree, threads, NULL, error)
+               ? ebpo_build_surface(tree, options->threads, &options->progress, error)
                : EBPO_OK;
 }
 

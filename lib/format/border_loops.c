@@ -26,17 +26,20 @@ void ebpo_border_loops_free(ebpo_border_loops *loops)
 /* Returns the text of the first error in the loops, or NULL. */
 static const char *find_fault(const ebpo_info *info, const ebpo_border_loops *loops)
 {
-    uint64_t points = 0, longest = 0;
+    uint64_t points = 0, longest = 0, weight = 0;
     for (uint64_t i = 0; i < loops->loop_count; i++) {
         uint64_t count = loops->loop[2 * i];
         if (count < 3 || count > loops->point_count - points || loops->loop[2 * i + 1] == 0)
             return "a loop has fewer than three points, more points than the header states, or the "
                    "weight 0";
         points += count;
+        weight += count * loops->loop[2 * i + 1]; /* below 2^63, because count < 2^31 in all */
         longest = count > longest ? count : longest;
     }
     if (points != loops->point_count || longest != info->border_longest)
         return "the loops do not add up to the counts in the header";
+    if (weight > EBPO_BORDER_WEIGHT_MAX)
+        return "the weights of the loops are too large";
     for (uint64_t i = 0; i < 3 * points; i++)
         if (!isfinite(loops->point[i]))
             return "a coordinate is not a finite number";

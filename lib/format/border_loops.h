@@ -5,6 +5,10 @@
 
 #include "format/file_in.h"
 
+/* Maximum of the sum of points times weight over all loops (RK.3). A segment crosses each cap at
+ * most once, so sums of 32 bits hold the crossings of a path of three segments with all caps. */
+enum { EBPO_BORDER_WEIGHT_MAX = 1 << 28 };
+
 /* Reads and checks the loops of a file with EBPO_PART_BORDER. `out` is cleared on failure. */
 EBPO_MUST_USE ebpo_status ebpo_border_read(const ebpo_file *file, ebpo_border_loops *out,
                                            ebpo_error *error);

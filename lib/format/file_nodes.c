@@ -158,6 +158,10 @@ ebpo_status ebpo_chunks_winding(ebpo_chunks *chunks, const ebpo_node *node, int3
         ebpo_rule_inside(info->rule, *winding) != (node->type == EBPO_BLACK))
         status = ebpo_chunks_fail(chunks, node->cell.level, id,
                                   "a node's winding number contradicts its type", error);
+    if (status == EBPO_OK && (*winding <= -EBPO_ENTRY_ZERO || *winding >= EBPO_ENTRY_ZERO))
+        status = ebpo_fail_file(error, EBPO_E_LIMIT, chunks->file->in.shown,
+                                "the winding number of a node is beyond 2^29: the solid has too "
+                                "many shells");
     return status;
 }
 

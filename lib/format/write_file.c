@@ -788,7 +788,7 @@ ebpo_status ebpo_repack_with(const ebpo_file *file, const char *path, const ebpo
         status = ebpo_file_read_tree(file, read, &tree, error);
     }
     if (status == EBPO_OK && change)
-        status = change(&tree, wanted.threads, error);
+        status = change(&tree, &wanted, error);
     if (status == EBPO_OK)
         status = ebpo_tree_write_into(&tree, ebpo_publish_path(&out), path, &wanted, error);
     ebpo_tree_free(&tree);

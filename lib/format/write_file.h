@@ -19,8 +19,10 @@ EBPO_MUST_USE ebpo_status ebpo_tree_store(const ebpo_tree *tree, const char *fol
                                           ebpo_file **out, ebpo_error *error);
 
 /* Callback of ebpo_repack_with: adds parts to the tree. The content checksum must not change, so
- * only parts with a separate checksum (colours, border, surface) may be added. */
-typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, unsigned threads, ebpo_error *error);
+ * only parts with a separate checksum (colours, border, surface) may be added. `options` has the
+ * number of threads and the progress. */
+typedef ebpo_status ebpo_change_tree_fn(ebpo_tree *tree, const ebpo_write_options *options,
+                                        ebpo_error *error);
 /* Same as ebpo_file_repack, but calls `change` after reading the tree and before writing it.
  * `change` may be NULL. */
 EBPO_MUST_USE ebpo_status ebpo_repack_with(const ebpo_file *file, const char *path,

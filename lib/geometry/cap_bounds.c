@@ -200,8 +200,9 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
                 count += find_parts(tree, entry, stack + count);
             } else {
                 bool is_full = lists->count - before == most;
-                if (is_full || !ebpo_grow(&lists->entry, &lists->capacity, lists->count + 1,
-                                          sizeof *lists->entry)) {
+                if (is_full ||
+                    !ebpo_array_grow_late(lists->workspace, &lists->entry, &lists->capacity,
+                                          lists->count + 1, sizeof *lists->entry)) {
                     lists->count = before;
                     return is_full ? EBPO_E_LIMIT : EBPO_E_MEMORY;
                 }

@@ -9,6 +9,7 @@
 #ifndef EBPO_GEOMETRY_CAP_BOUNDS_H
 #define EBPO_GEOMETRY_CAP_BOUNDS_H
 
+#include "core/workspace.h"
 #include "geometry/cap_tree.h"
 
 /* A box, or a point if the radius is 0. */
@@ -25,8 +26,9 @@ static inline ebpo_cap_box ebpo_cap_point(const double p[3])
 
 #define EBPO_CAP_TRIANGLE UINT32_C(0x80000000)
 
-/* Lists of entries, one after another. */
+/* Lists of entries, one after another. The owner frees `entry` by ebpo_array_free. */
 typedef struct ebpo_cap_lists {
+    ebpo_workspace *workspace; /* owns `entry`; NULL: malloc */
     uint32_t *entry;
     uint64_t count, capacity;
 } ebpo_cap_lists;

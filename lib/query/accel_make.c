@@ -405,10 +405,11 @@ static uint32_t walk_node(walk *w, int depth, ebpo_node_type type)
         return uniform_entry(w, level->black_winding, rank, 1);
     if (type == EBPO_LEAF) {
         uint32_t index = (uint32_t)(w->leaf_begin[depth] + rank);
+        uint32_t uniform = uniform_entry(w, level->leaf_winding, rank, 0); /* checks the number */
         fill_leaf(w, level, depth, rank, index);
         /* a leaf without faces, in a surface with holes, is like a white node */
         if (depth > 0 && level->leaf_new[rank] == 0 && level->leaf_ref_count[rank] == 0)
-            return uniform_entry(w, level->leaf_winding, rank, 0);
+            return uniform;
         return ebpo_entry(EBPO_ENTRY_LEAF, index);
     }
     uint64_t group = w->group_begin[depth + 1] + rank;

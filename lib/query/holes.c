@@ -209,12 +209,36 @@ static near_discs narrow_list(marking *w, const ebpo_cap_box *box, const near_di
     return near;
 }
 
-/* Takes bytes of the quota for the table. Returns false if the quota has too few bytes. */
-static bool use_bytes(marking *w, uint64_t bytes)
+/* Ensures that an array of the table has capacity for `need` items. Takes the bytes of its capacity
+ * from the quota. An array grows by an eighth, so that most of the quota is used. Returns false if
+ * the quota has too few bytes, or when out of memory. */
+static bool grow_in_quota(marking *w, void *array, uint64_t *capacity, uint64_t need, size_t size)
 {
-    bool fits = bytes <= w->bytes;
-    w->bytes -= fits ? bytes : 0;
-    return fits;
+    if (need <= *capacity)
+        return true;
+    uint64_t most = *capacity + w->bytes / size, wanted = *capacity + *capacity / 8 + 16;
+    wanted = wanted < need ? need : wanted;
+    wanted = wanted > most ? most : wanted;
+    void *old, *grown = NULL;
+    memcpy(&old, array, sizeof old);
+    if (wanted >= need)
+        grown = ebpo_realloc(old, wanted, size);
+    if (!grown)
+        return false;
+    memcpy(array, &grown, sizeof grown);
+    w->bytes -= (wanted - *capacity) * size;
+    *capacity = wanted;
+    return true;
+}
+
+/* Frees the part of an array's capacity that has no items. */
+static void shrink_array(void *array, uint64_t count, size_t size)
+{
+    void *old;
+    memcpy(&old, array, sizeof old);
+    void *shrunk = old ? ebpo_realloc(old, count ? count : 1, size) : NULL;
+    if (shrunk)
+        memcpy(array, &shrunk, sizeof shrunk);
 }
 
 /* Adds an ebpo_near_cell to the table. Returns its index, or -1 if there is no space. */
@@ -223,9 +247,9 @@ static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, in
     ebpo_node_table *t = w->m->table;
     uint64_t count = near->end - near->begin;
     if (!w->has_memory || t->near_count >= 1 << 25 || t->disc_count + count > UINT32_MAX ||
-        count > UINT16_MAX || !use_bytes(w, sizeof *t->near + count * sizeof *t->disc) ||
-        !ebpo_grow(&t->near, &w->near_capacity, t->near_count + 1, sizeof *t->near) ||
-        !ebpo_grow(&t->disc, &w->disc_capacity, t->disc_count + count, sizeof *t->disc))
+        count > UINT16_MAX ||
+        !grow_in_quota(w, &t->near, &w->near_capacity, t->near_count + 1, sizeof *t->near) ||
+        !grow_in_quota(w, &t->disc, &w->disc_capacity, t->disc_count + count, sizeof *t->disc))
         return -1;
     if (count)
         memcpy(t->disc + t->disc_count, w->lists.entry + near->begin, count * sizeof *t->disc);
@@ -263,8 +287,8 @@ static int32_t split_cell(marking *w, const marked_cell *whole, const near_discs
     uint32_t index = t->split_count;
     marked_cell part = *whole;
     double low[3], corner[3], high[3];
-    if (whole->cell.level >= w->m->deepest || index >= 1 << 25 || !use_bytes(w, sizeof *t->split) ||
-        !ebpo_grow(&t->split, &w->split_capacity, index + 1, sizeof *t->split))
+    if (whole->cell.level >= w->m->deepest || index >= 1 << 25 ||
+        !grow_in_quota(w, &t->split, &w->split_capacity, index + 1, sizeof *t->split))
         return -1;
     t->split_count++;
     if (whole->cell.level + 1 == w->m->deepest && whole->record < 0)
@@ -298,13 +322,15 @@ static int32_t mark_cell(marking *w, const marked_cell *m, const near_discs *par
     const ebpo_cap_box box = box_of(w, m->cell);
     const near_discs near = narrow_list(w, &box, parent);
     int32_t result = -1, marked;
+    w->fits = w->fits && abs(m->winding) < 1 << 25;
+    if (!w->fits) /* the marks fail, and sums of winding numbers could overflow */
+        return 0;
     if (near.decided)
         result = !m->leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, m->winding);
     else if (w->has_memory)
         result = !m->leaf ? find_result(w, m->cell, &box, &near, m->winding)
                  : is_far_leaf(w, m->cell, &box, &near) ? 0
                                                         : -1;
-    w->fits = w->fits && abs(m->winding) < 1 << 25;
     marked = result >= 0 ? ebpo_marked_entry(m->winding, (ebpo_uniform_mark)result)
                          : mark_undecided(w, m, &near);
     w->lists.count = near.begin;
@@ -397,6 +423,9 @@ ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, 
     mark_node(w, &table->root, marked->root, &all);
     bool fits = w->fits;
     holes->terms += w->terms;
+    shrink_array(&table->near, table->near_count, sizeof *table->near);
+    shrink_array(&table->disc, table->disc_count, sizeof *table->disc);
+    shrink_array(&table->split, table->split_count, sizeof *table->split);
     free(w->lists.entry);
     free(w);
     if (table->grid) { /* the grid has copies of entries, so the grid is made again */

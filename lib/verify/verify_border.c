@@ -163,7 +163,8 @@ bool ebpo_check_border_loops(ebpo_tally *tally, const ebpo_tree *tree)
         longest = count > longest ? count : longest;
     }
     if (!CHECK(valid && points == loops->point_count && longest == tree->info.border_longest,
-               "the loops of the border contradict the header"))
+               "the loops of the border contradict the header") ||
+        !CHECK(weights <= 1 << 28, "the weights of the loops are too large"))
         return false;
     if (tree->info.pruned)
         return true;

@@ -442,13 +442,25 @@ static void check_same_files(const char *one, const char *other)
 
 /* The border that is added to a file equals the border that is built, except for envelopes: those
  * of a built surface contain its inside. */
+/* Stops when winding numbers of nodes are computed, which is the only stage "border" of a repack.
+ */
+static bool stop_windings(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    (void)user;
+    return strcmp(stage, "border") != 0 || done == total;
+}
+
 START_TEST(test_border_is_added_to_file)
 {
     uint64_t state = 4, seed = 4;
     ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    write.progress.report = stop_windings;
     write_model(scratch("without.ebpo.h5"), holed_torus(&state, 20, 5), false);
     write_model(scratch("with.ebpo.h5"), holed_torus(&seed, 20, 5), true);
     ebpo_file *file = model_open(scratch("without.ebpo.h5"));
+    ck_assert_int_eq(ebpo_file_add_border(file, scratch("added.ebpo.h5"), NULL, &write, &error),
+                     EBPO_E_CANCELLED);
     model_must(ebpo_file_add_border(file, scratch("added.ebpo.h5"), NULL, NULL, &error), "adding",
                &error);
     ebpo_close(file);
@@ -666,6 +678,47 @@ START_TEST(test_sparse_caps_have_small_envelopes)
                &error);
     ck_assert_int_eq(ebpo_build(&mesh, &found, &repairs, &build, &tree, &error), EBPO_E_CANCELLED);
     ck_assert(stopped);
+}
+END_TEST
+
+/* Builds a model of a mesh file in a workspace, without these parts. Returns the most bytes of
+ * arrays in memory. */
+static uint64_t build_in_workspace(const char *path, uint32_t omitted)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_workspace_options options = EBPO_WORKSPACE_OPTIONS_INIT;
+    ebpo_workspace_stats stats = EBPO_WORKSPACE_STATS_INIT;
+    ebpo_mesh_read_options read = EBPO_MESH_READ_OPTIONS_INIT;
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_mesh mesh;
+    ebpo_mesh_report found;
+    ebpo_tree tree;
+    build.parts &= ~omitted;
+    build.leaf_faces = 1;
+    options.memory = UINT64_C(1) << 30;
+    model_must(ebpo_workspace_new(&options, &read.workspace, &error), "workspace", &error);
+    model_must(ebpo_mesh_read(path, &read, &mesh, &error), "reading", &error);
+    model_must(ebpo_mesh_check(&mesh, 1, (ebpo_progress){ NULL, NULL }, &found, &error), "checking",
+               &error);
+    model_must(ebpo_build(&mesh, &found, NULL, &build, &tree, &error), "building", &error);
+    ck_assert_int_eq(ebpo_workspace_get_stats(read.workspace, &stats), EBPO_OK);
+    ebpo_tree_free(&tree);
+    ebpo_workspace_free(read.workspace);
+    return stats.held_peak;
+}
+
+/* The lists of caps near the cells are in the workspace, so a budget for memory limits them. */
+START_TEST(test_lists_of_caps_are_in_workspace)
+{
+    uint64_t state = 4;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = sparse_soup(&state, 5000);
+    model_must(ebpo_mesh_write_ply(&mesh, scratch("soup.ply"), &error), "writing", &error);
+    ebpo_mesh_free(&mesh);
+    uint64_t with = build_in_workspace(scratch("soup.ply"), 0),
+             without = build_in_workspace(scratch("soup.ply"), EBPO_PART_BORDER);
+    ck_assert_msg(with > without + (1 << 20), "%llu and %llu bytes", (unsigned long long)with,
+                  (unsigned long long)without);
 }
 END_TEST
 
@@ -889,6 +942,7 @@ TEST_SUITE(holes)
     tcase_add_checked_fixture(wide, scratch_enter, scratch_leave);
     tcase_add_test(wide, test_overlapping_caps_take_bounded_work);
     tcase_add_test(wide, test_sparse_caps_have_small_envelopes);
+    tcase_add_test(wide, test_lists_of_caps_are_in_workspace);
     suite_add_tcase(suite, wide);
     if (getenv("EBPO_MODELS")) {
         TCase *real = tcase_create("scans");

@@ -407,6 +407,7 @@ static ebpo_status call_add_border(every_call_env *e)
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_file *file = NULL, *whole = NULL;
+    ebpo_mesh mesh = { 0 };
     read.threads = write.threads = 1;
     read.workspace = e->workspace;
     ebpo_status status = ebpo_open(scratch(EVERY_CALL_SURFACE), &file, e->error);
@@ -416,6 +417,11 @@ static ebpo_status call_add_border(every_call_env *e)
         status = ebpo_open(scratch("part.ebpo.h5"), &whole, e->error);
     if (status == EBPO_OK)
         status = query_surface(whole, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_file_read_mesh(whole, &read, &mesh, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_add_caps(&mesh, whole, e->error);
+    ebpo_mesh_free(&mesh);
     ebpo_close(whole);
     ebpo_close(file);
     return status;

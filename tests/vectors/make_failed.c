@@ -567,6 +567,7 @@ static void v_border_solid(void) { set_text("/", "kind", "solid"); }
 static void v_border_counts(void) { set_count("/", "border_loops", 7); }
 static void v_border_longest(void) { set_count("/", "border_longest", 4); }
 static void v_border_weight(void) { poke("/border/loops", 1, 0); }
+static void v_border_weights(void) { poke("/border/loops", 1, INT64_C(1) << 31); }
 static void v_border_nan(void) { poke("/border/points", 0, INT64_C(0xfffffffe)); }
 static void v_border_changed(void) { poke("/border/loops", 1, 3); }
 static void v_border_moved(void) { add_to("/border/points", 6, INT64_C(1) << 21); }
@@ -746,6 +747,7 @@ static const failed_vector failed[] = {
     { "border_counts", BORDER, v_border_counts, NONE, "RK.2" },
     { "border_longest", BORDER, v_border_longest, NONE, "RK.3" },
     { "border_weight_zero", BORDER, v_border_weight, NONE, "RK.3" },
+    { "border_weights_large", BORDER, v_border_weights, NONE, "RK.3" },
     { "border_nan", BORDER, v_border_nan, NONE, "RK.4" },
     { "border_changed", BORDER, v_border_changed, NONE, "RK.5" },
     { "unverified_border_moved", BORDER, v_border_moved, NONE, "RK.6" },

@@ -825,7 +825,7 @@ static ebpo_mesh open_faces(void)
 static void add_border(ebpo_tree *tree)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    if (ebpo_build_border(tree, 1, &error) != EBPO_OK)
+    if (ebpo_build_border(tree, 1, NULL, &error) != EBPO_OK)
         die("border", error.message);
 }
 

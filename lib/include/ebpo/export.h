@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * Exports levels, simplified surfaces and the mesh to formats of other programs. A level is
  * exported as the envelopes of its nodes, which are convex polyhedra that contain the parts of the
- * solid in the nodes' cells. ebpo_mesh_write_ply (mesh.h) writes PLY.
+ * solid in the nodes' cells. ebpo_mesh_write_ply (mesh.h) writes PLY. Also adds caps to a mesh.
  */
 #ifndef EBPO_EXPORT_H
 #define EBPO_EXPORT_H
@@ -201,6 +201,24 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_export(const ebpo_file *file, const char
                                                ebpo_export_format format,
                                                const ebpo_export_options *options,
                                                ebpo_export_report *report, ebpo_error *error);
+
+/*
+ * Closes the holes of a surface: appends caps to a mesh that was read from `file`. The caps are
+ * triangles over the points of the border (format-spec/border.md); they follow the faces. Their
+ * vertices are new, so they have equal positions but other indices than those of the faces. The
+ * mesh and its caps are in the mesh's workspace. Other data of the mesh (attributes) are freed.
+ *
+ * mesh     from ebpo_file_read_mesh or ebpo_file_read_source_mesh, or a zeroed struct for a mesh of
+ *          the caps alone; unchanged on failure
+ *
+ * EBPO_E_ABSENT: the file has no border, or is a subset. EBPO_E_LIMIT: more than 2^32 - 2 vertices
+ * or faces, or more caps than three times the file's faces plus the points of the border. Also the
+ * errors of reading (base.h).
+ *
+ * Threads: one at a time per mesh.
+ */
+EBPO_API EBPO_MUST_USE ebpo_status ebpo_mesh_add_caps(ebpo_mesh *mesh, const ebpo_file *file,
+                                                      ebpo_error *error);
 
 #ifdef __cplusplus
 }

@@ -6,7 +6,6 @@
 #include "cli/command.h"
 #include "cli/json.h"
 #include "cli/memory_args.h"
-#include "cli/mesh_caps.h"
 #include "cli/progress.h"
 #include "cli/reading.h"
 #include "cli/remote_args.h"
@@ -56,9 +55,6 @@ static int check_values(const values *v, const char *in, const char *out)
             "extract", "--no-cell-faces applies to --level only; the model has no cell faces");
     if (v->caps && !v->mesh)
         return command_usage("extract", "--caps applies to --mesh only");
-    if (v->caps && v->memory.memory)
-        return command_usage("extract",
-                             "--caps keeps the whole tree in memory; omit --memory or --caps");
     if (command_overwrites("extract", in, out))
         return EXIT_USAGE;
     return EXIT_OK;
@@ -157,7 +153,7 @@ static ebpo_status take_mesh(ebpo_file *file, const values *v, const char *path,
                 "ebpo extract: %s: note: is a subset, so its mesh is only part of the model's\n",
                 remote_shown(path));
     if (status == EBPO_OK && v->caps)
-        status = mesh_caps_add(&out->mesh, file, remote_shown(path), (unsigned)v->threads, error);
+        status = ebpo_mesh_add_caps(&out->mesh, file, error);
     return status;
 }
 

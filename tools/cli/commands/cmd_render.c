@@ -11,7 +11,6 @@
 
 #include "cli/command.h"
 #include "cli/file_facts.h"
-#include "cli/mesh_caps.h"
 #include "cli/mesh_findings.h"
 #include "cli/json.h"
 #include "cli/process_memory.h"
@@ -162,11 +161,10 @@ static ebpo_status load_surface(tile *t, const ebpo_file *file, ebpo_error *erro
 }
 
 /* Adds the caps to the mesh of a tile. */
-static ebpo_status add_caps(tile *t, const ebpo_file *file, const char *path, unsigned threads,
-                            ebpo_error *error)
+static ebpo_status add_caps(tile *t, const ebpo_file *file, const char *path, ebpo_error *error)
 {
     uint64_t faces = t->mesh.face_count;
-    ebpo_status status = mesh_caps_add(&t->mesh, file, path, threads, error);
+    ebpo_status status = ebpo_mesh_add_caps(&t->mesh, file, error);
     if (status != EBPO_OK)
         return status;
     t->paint = malloc(t->mesh.face_count + 1);
@@ -192,7 +190,7 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         read.attributes = !j->v.no_colours && !j->v.caps;
         ebpo_status read_status = ebpo_file_read_mesh(file, &read, &t->mesh, error);
         if (read_status == EBPO_OK && j->v.caps)
-            return add_caps(t, file, remote_shown(j->in), threads, error);
+            return add_caps(t, file, remote_shown(j->in), error);
         return read_status == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error)
                                       : read_status;
     }
