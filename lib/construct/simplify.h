@@ -41,11 +41,11 @@ void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh);
 EBPO_MUST_USE ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error);
 
 /* Sets *out to an upper bound of the greatest distance of a point of `a` from `b`. `b` must have
- * triangles. The function improves the bound until one of these conditions is true: the bound is at
- * most `known`; it exceeds the distance by at most 5 %; it exceeds the distance by at most `fine`;
- * the number of steps reaches a limit, which is proportional to the number of triangles.
- * All distances have the unit of the coordinates. The caller adds the rounding error, about 2^-45
- * of the greatest coordinate. Returns EBPO_E_MEMORY. Any thread. */
+ * triangles, at most UINT32_MAX / 3. The function improves the bound until one of these conditions
+ * is true: the bound is at most `known`; it exceeds the distance by at most 5 %; it exceeds the
+ * distance by at most `fine`; the number of steps reaches a limit, which is proportional to the
+ * number of triangles. All distances have the unit of the coordinates. The caller adds the rounding
+ * error, about 2^-45 of the greatest coordinate. Returns EBPO_E_MEMORY. Any thread. */
 EBPO_MUST_USE ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh *b,
                                               double fine, double known, double *out,
                                               ebpo_error *error);

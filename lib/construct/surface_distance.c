@@ -11,6 +11,8 @@
  * otherwise it is halved. Halving alone would make very many parts if both surfaces divide a plane
  * into slivers. The second surface is stored in a complete binary tree of boxes.
  *
+ * Most triangles need no cuts, because ebpo_cover_bound gives a bound that is close enough.
+ *
  * If many triangles are long and overlap, a search visits most boxes, and there are very many
  * parts. So the number of visited boxes and the number of parts are limited, in proportion to the
  * number of triangles. At the limit, the greatest bound is the result. */
@@ -21,6 +23,7 @@
 #include <string.h>
 
 #include "construct/simplify.h"
+#include "construct/surface_cover.h"
 #include "core/alloc.h"
 #include "geometry/vec3.h"
 
@@ -32,7 +35,7 @@
  * triangle, that are visited until no more triangles are cut; most models need less than 200.
  * MORE_PARTS: greatest number of stored parts minus the number of triangles. */
 enum {
-    LEAF_TRIANGLES = 4,
+    LEAF_TRIANGLES = 2,
     DEEPEST = 64,
     MOST_CUTS = 64,
     PRISM_CUTS = 20,
@@ -70,44 +73,41 @@ static void get_corner(const ebpo_patch_mesh *mesh, uint64_t triangle, int k, do
     memcpy(out, mesh->vertex[mesh->triangle[3 * triangle + (uint64_t)k]].at, 3 * sizeof *out);
 }
 
-static double clamp_share(double t) { return t < 0 ? 0 : t > 1 ? 1 : t; }
-
-/* Returns the squared distance of p from the segment of the points a + t d with 0 <= t <= 1. */
-static double segment_square(const double p[3], const double a[3], const double d[3])
+/* Returns the squared distance of the point v from the points t d with 0 <= t <= 1. */
+static double segment_square(const double v[3], const double d[3])
 {
-    double v[3], length = ebpo_vec3_dot(d, d);
-    ebpo_vec3_subtract(p, a, v);
-    double t = length > 0 ? clamp_share(ebpo_vec3_dot(v, d) / length) : 0;
+    double w[3], along = ebpo_vec3_dot(v, d), length = ebpo_vec3_dot(d, d),
+                 t = along <= 0        ? 0
+                     : along >= length ? 1
+                                       : along / length;
     for (int k = 0; k < 3; k++)
-        v[k] -= t * d[k];
-    return ebpo_vec3_dot(v, v);
+        w[k] = v[k] - t * d[k];
+    return ebpo_vec3_dot(w, w);
 }
 
 /* Returns the squared distance of p from a point of triangle t. Except for rounding errors, this
  * point is the nearest one to p. */
 static double triangle_square(const double p[3], const double t[3][3])
 {
-    double edge[3][3], n[3], v[3];
-    for (int k = 0; k < 3; k++)
+    double edge[3][3], n[3], v[3][3], best = INFINITY;
+    for (int k = 0; k < 3; k++) {
         ebpo_vec3_subtract(t[(k + 1) % 3], t[k], edge[k]);
+        ebpo_vec3_subtract(p, t[k], v[k]);
+    }
     ebpo_vec3_cross(edge[0], edge[1], n);
     double area = ebpo_vec3_dot(n, n);
-    bool within = area > 0;
-    for (int k = 0; k < 3 && within; k++) {
+    for (int k = 0; k < 3; k++) {
         double across[3];
-        ebpo_vec3_subtract(p, t[k], v);
-        ebpo_vec3_cross(edge[k], v, across);
-        within = ebpo_vec3_dot(across, n) >= 0;
+        ebpo_vec3_cross(edge[k], v[k], across);
+        if (area > 0 && ebpo_vec3_dot(across, n) >= 0)
+            continue; /* p is on the inner side of the edge, so another point is nearer */
+        double square = segment_square(v[k], edge[k]);
+        best = square < best ? square : best;
     }
-    if (within) {
-        ebpo_vec3_subtract(p, t[0], v);
-        double height = ebpo_vec3_dot(v, n);
-        return height * height / area;
-    }
-    double best = segment_square(p, t[0], edge[0]);
-    for (int k = 1; k < 3; k++)
-        best = fmin(best, segment_square(p, t[k], edge[k]));
-    return best;
+    if (best < INFINITY)
+        return best;
+    double height = ebpo_vec3_dot(v[0], n); /* p is inside of the prism over t */
+    return height * height / area;
 }
 
 /* Returns the squared distance of p from a triangle of the second surface. */
@@ -221,6 +221,7 @@ typedef struct part {
 
 typedef struct bounding {
     search to;          /* the second surface */
+    ebpo_cover cover;   /* also the second surface */
     double point_most;  /* greatest distance of a point that was found so far */
     double fine, known; /* as for ebpo_bound_distance */
     double bound;       /* upper bound of the distance over all triangles so far, except `heap` */
@@ -428,31 +429,50 @@ static void cut_parts(bounding *b, uint64_t steps, uint64_t parts)
     }
 }
 
+/* Returns true if the bound of a triangle of the first surface by a triangle of the second one is
+ * sufficient, and notes the bound. */
+static bool is_near(bounding *b, double p[3][3], uint64_t triangle)
+{
+    double enough = enough_of(b), square = 0;
+    for (int k = 0; k < 3 && square <= enough * enough; k++)
+        square = fmax(square, square_to(&b->to, triangle, p[k]));
+    if (square > enough * enough)
+        return false;
+    b->guess = triangle;
+    b->bound = fmax(b->bound, sqrt(square));
+    return true;
+}
+
 /* Bounds the distance over triangle t of `a`. First tries the triangles of the second surface that
  * were near the neighbours of t. `near`: [vertex of a] such a triangle, or UINT64_MAX. */
 static void bound_from_neighbours(bounding *b, const ebpo_patch_mesh *a, uint64_t t, uint64_t *near)
 {
     const uint32_t *corners = a->triangle + 3 * t;
-    uint64_t guess[4] = { b->guess, near[corners[0]], near[corners[1]], near[corners[2]] };
-    double p[3][3], enough = enough_of(b);
+    uint64_t guess[EBPO_COVER_GUESSES] = { near[corners[0]], near[corners[1]], near[corners[2]],
+                                           b->guess };
+    double p[3][3], far[3];
+    bool close = false;
     for (int k = 0; k < 3; k++)
         get_corner(a, t, k, p[k]);
-    bool close = false;
-    for (int i = 0; i < 4 && !close; i++) {
+    for (int i = EBPO_COVER_GUESSES; i-- > 0 && !close;) {
         bool repeated = guess[i] == UINT64_MAX;
-        for (int k = 0; k < i; k++)
+        for (int k = i + 1; k < EBPO_COVER_GUESSES; k++)
             repeated = repeated || guess[k] == guess[i];
-        if (repeated)
-            continue;
-        double over = sqrt(corners_square(&b->to, guess[i], p));
-        close = over <= enough;
-        if (close) {
-            b->guess = guess[i];
-            b->bound = fmax(b->bound, over);
-        }
+        close = !repeated && is_near(b, p, guess[i]);
     }
-    if (!close)
-        bound_triangle(b, p, INFINITY, 0);
+    if (!close) {
+        double over = ebpo_cover_bound(&b->cover, (const double(*)[3])p, guess,
+                                       fmax(b->bound, b->known), &b->guess, far);
+        if (over > enough_of(b) && over < INFINITY) {
+            hit h = find_nearest(&b->to, far, b->guess, 0);
+            if (h.nearest)
+                b->point_most = fmax(b->point_most, sqrt(h.square));
+        }
+        if (over <= enough_of(b))
+            b->bound = fmax(b->bound, over);
+        else
+            bound_triangle(b, p, over, 0);
+    }
     for (int k = 0; k < 3; k++)
         near[corners[k]] = b->guess;
 }
@@ -464,8 +484,10 @@ ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh 
     uint64_t triangles = a->triangle_count + b->triangle_count, *near;
     *out = 0;
     near = ebpo_alloc(a->vertex_count, sizeof *near);
-    if (!near || !make_search(&all.to, b)) {
+    if (!near || !make_search(&all.to, b) || !ebpo_cover_make(&all.cover, b)) {
         free(near);
+        free(all.to.node);
+        ebpo_cover_free(&all.cover);
         return ebpo_fail_memory(error, b->triangle_count * sizeof *all.to.node);
     }
     for (uint64_t v = 0; v < a->vertex_count; v++)
@@ -486,5 +508,6 @@ ebpo_status ebpo_bound_distance(const ebpo_patch_mesh *a, const ebpo_patch_mesh 
     free(near);
     free(all.heap);
     free(all.to.node);
+    ebpo_cover_free(&all.cover);
     return all.short_of_memory ? ebpo_fail_memory(error, all.capacity * sizeof *all.heap) : EBPO_OK;
 }

@@ -38,8 +38,9 @@ LIBRARIES = {
     "qhull_r": ("libqhull-dev", "qhull", "qhull"),
     "check": (None, None, None),  # tests are not built in packages
 }
+VIEWER = "usr/share/ebpo/viewer"
 OPTIONAL = {"usr/lib/TRIPLET/libebpo.a",  # only with -Ddefault_library=both
-            "usr/share/ebpo/viewer"}  # only if it was built before
+            VIEWER}  # only if it was built before
 
 
 def introspect(what):
@@ -95,6 +96,8 @@ def check_lists():
         if len(takers[path]) != 1:
             problems.append(f"{path}: installed, and in {' and '.join(takers[path]) or 'no package'} of "
                             "tools/packaging/debian/*.install")
+    if f"dh_install -pebpo {VIEWER}" not in (debian / "rules").read_text():
+        problems.append(f"debian/rules: does not install {VIEWER}, so dh_missing stops if the viewer was built")
     return len(paths)
 
 

@@ -11,7 +11,7 @@
 #include <ebpo/view.h>
 
 #include "check_main.h"
-#include "construct/simplify.h"
+#include "construct/surface_cover.h"
 #include "format/chunk_directory.h"
 #include "format/surface_patches.h"
 #include "geometry/distance.h"
@@ -123,34 +123,125 @@ static ebpo_patch_mesh overlapping(uint64_t count, uint64_t *state)
     return mesh;
 }
 
-/* The bound is an upper bound, and is close to the greatest distance of a point. */
-START_TEST(test_bound_of_overlapping_triangles)
+/* Checks that the bound of the distance from `a` to `b` holds at random points of `a`, and that it
+ * is at most `times` the greatest distance of these points. */
+static void check_bound(const ebpo_patch_mesh *a, const ebpo_patch_mesh *b, uint64_t points,
+                        double times, uint64_t *state)
 {
     ebpo_error error = EBPO_ERROR_INIT;
-    uint64_t state = 5;
-    ebpo_patch_mesh a = overlapping(300, &state), b = overlapping(300, &state);
     double bound, most = 0;
-    must(ebpo_bound_distance(&a, &b, 1e-6, 0, &bound, &error), "bound", &error);
-    for (uint64_t i = 0; i < 4000; i++) {
-        double p[3], least = INFINITY, u = ebpo_test_random_unit(&state),
-                     v = (1 - u) * ebpo_test_random_unit(&state);
-        const ebpo_patch_vertex *t = a.vertex + 3 * (i % a.triangle_count);
+    must(ebpo_bound_distance(a, b, 1e-6, 0, &bound, &error), "bound", &error);
+    for (uint64_t i = 0; i < points; i++) {
+        double p[3], least = INFINITY, u = ebpo_test_random_unit(state),
+                     v = (1 - u) * ebpo_test_random_unit(state);
+        const uint32_t *t = a->triangle + 3 * (i % a->triangle_count);
+        const double *q[3] = { a->vertex[t[0]].at, a->vertex[t[1]].at, a->vertex[t[2]].at };
         for (int k = 0; k < 3; k++)
-            p[k] = t[0].at[k] + u * (t[1].at[k] - t[0].at[k]) + v * (t[2].at[k] - t[0].at[k]);
-        for (uint64_t n = 0; n < b.triangle_count; n++) {
+            p[k] = q[0][k] + u * (q[1][k] - q[0][k]) + v * (q[2][k] - q[0][k]);
+        for (uint64_t n = 0; n < b->triangle_count; n++) {
             ebpo_distance_bounds d;
             double corner[3][3];
-            for (int k = 0; k < 3; k++)
-                memcpy(corner[k], b.vertex[3 * n + (uint64_t)k].at, sizeof corner[k]);
+            for (uint64_t k = 0; k < 3; k++)
+                memcpy(corner[k], b->vertex[b->triangle[3 * n + k]].at, sizeof corner[k]);
             ebpo_triangle_distance_bounds(p, (const double(*)[3])corner, &d);
             least = fmin(least, d.lo);
         }
         most = fmax(most, least);
     }
     ck_assert_double_le(most, bound);
-    ck_assert_double_le(bound, 1.05 * most);
+    ck_assert_double_le(bound, times * most + 1e-6);
+}
+
+/* The bound is an upper bound, and is close to the greatest distance of a point. */
+START_TEST(test_bound_of_overlapping_triangles)
+{
+    uint64_t state = 5;
+    ebpo_patch_mesh a = overlapping(300, &state), b = overlapping(300, &state);
+    check_bound(&a, &b, 4000, 1.05, &state);
     ebpo_patch_mesh_free(&a);
     ebpo_patch_mesh_free(&b);
+}
+END_TEST
+
+/* Makes a square of n x n x 2 triangles with random heights. Omits each triangle with probability
+ * `missing`, and adds triangles with the same corners, as many on average. */
+static ebpo_patch_mesh sheet(uint32_t n, double height, double missing, uint64_t *state)
+{
+    ebpo_patch_mesh mesh = { .vertex_count = (n + 1) * (n + 1) };
+    mesh.vertex = calloc(mesh.vertex_count, sizeof *mesh.vertex);
+    mesh.triangle = malloc((uint64_t)n * n * 2 * 6 * sizeof *mesh.triangle);
+    for (uint32_t v = 0; v < mesh.vertex_count; v++) {
+        double *at = mesh.vertex[v].at, u = ebpo_test_random_unit(state);
+        at[0] = (v % (n + 1) + 0.3 * ebpo_test_random_unit(state)) / n;
+        at[1] = (v / (n + 1) + 0.3 * u) / n;
+        at[2] = height * ebpo_test_random_unit(state);
+    }
+    for (uint32_t i = 0; i < 2 * n * n; i++) {
+        uint32_t v = i / 2 % n + i / 2 / n * (n + 1), other = v + (i % 2 ? n + 1 : 1);
+        uint32_t t[3] = { v, i % 2 ? v + n + 2 : other, i % 2 ? other : v + n + 2 };
+        for (int copies = 0; copies < 2; copies++)
+            if ((ebpo_test_random_unit(state) < missing) == (copies == 1))
+                memcpy(mesh.triangle + 3 * mesh.triangle_count++, t, sizeof t);
+    }
+    return mesh;
+}
+
+/* Sheets with holes, double triangles and borders: bounds by triangles that cover a triangle. */
+START_TEST(test_bound_of_sheets)
+{
+    uint64_t state = 7;
+    for (int round = 0; round < 40; round++) {
+        double height = ldexp(0.5, -round % 8), missing = round % 3 * 0.02;
+        uint32_t n = 3 + (uint32_t)(8 * ebpo_test_random_unit(&state)),
+                 m = 3 + (uint32_t)(8 * ebpo_test_random_unit(&state));
+        ebpo_patch_mesh a = sheet(n, height, 0, &state), b = sheet(m, height, missing, &state);
+        check_bound(&a, &b, 400, 4, &state);
+        ebpo_patch_mesh_free(&a);
+        ebpo_patch_mesh_free(&b);
+    }
+}
+END_TEST
+
+/* Returns ebpo_cover_bound of the triangle (0, 0, 0), (1, 0, 0), (0, 1, 0), for a surface of one or
+ * two triangles with the corners 0, 1, 2 and 0, 2, 3. */
+static double bound_of_half_square(const double corner[4][3], uint64_t triangles)
+{
+    static const double p[3][3] = { { 0, 0, 0 }, { 1, 0, 0 }, { 0, 1, 0 } };
+    static const uint64_t guess[EBPO_COVER_GUESSES] = { UINT64_MAX, UINT64_MAX, UINT64_MAX, 0 };
+    uint32_t index[6] = { 0, 1, 2, 0, 2, 3 };
+    ebpo_patch_vertex vertex[4] = { 0 };
+    ebpo_patch_mesh surface = {
+        .vertex_count = 4, .triangle_count = triangles, .vertex = vertex, .triangle = index
+    };
+    ebpo_cover cover;
+    uint64_t near = UINT64_MAX;
+    double far[3];
+    for (int k = 0; k < 4; k++)
+        memcpy(vertex[k].at, corner[k], sizeof corner[k]);
+    ck_assert(ebpo_cover_make(&cover, &surface));
+    double bound = ebpo_cover_bound(&cover, p, guess, 0, &near, far);
+    ck_assert(bound == INFINITY || near < triangles);
+    ebpo_cover_free(&cover);
+    return bound;
+}
+
+/* Surfaces that cover a triangle, in part or not at all. */
+START_TEST(test_covers)
+{
+    const double above[4]
+                      [3] = { { -1, -1, 0.25 }, { 2, -1, 0.25 }, { 2, 2, 0.25 }, { -1, 2, 0.25 } },
+              slanted[4][3] = { { -1, -1, 0.5 }, { 3, -1, 0.5 }, { 3, 3, 0.5 }, { -1, 3, -1.5 } },
+              narrow[4][3] = { { -1, -1, 0 }, { 1.5, -0.75, 0 }, { -0.75, 1.5, 0 }, { -1, 1, 0 } },
+              beside[4][3] = { { 0.9, -0.1, 0 }, { 1.2, -1, 0 }, { 1.5, 0.2, 0 }, { 2, 2, 0 } },
+              small[4][3] = { { 0.3, 0.3, 0 }, { 0.4, 0.3, 0 }, { 0.4, 0.4, 0 }, { 0.3, 0.4, 0 } };
+    ck_assert_double_eq_tol(bound_of_half_square(above, 2), 0.25, 1e-9);
+    /* the triangle 0, 2, 3 has the least height over (0, 1), and the triangle 0, 1, 2 has 0.5 */
+    ck_assert_double_eq_tol(bound_of_half_square(slanted, 2), 0.5, 1e-9);
+    /* the side x + y = 1 is beyond the border of the surface, at x + y = 0.75 */
+    ck_assert_double_eq_tol(bound_of_half_square(narrow, 2), 0.25 * sqrt(0.5), 1e-9);
+    ck_assert(bound_of_half_square(above, 1) >= 0.25); /* half is missing */
+    ck_assert(bound_of_half_square(beside, 1) == INFINITY);
+    ck_assert(bound_of_half_square(small, 2) == INFINITY);
 }
 END_TEST
 
@@ -611,6 +702,8 @@ TEST_SUITE(surface)
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_add_test(tests, test_errors_hold);
     tcase_add_test(tests, test_bound_of_overlapping_triangles);
+    tcase_add_test(tests, test_bound_of_sheets);
+    tcase_add_test(tests, test_covers);
     tcase_add_test(tests, test_joined_levels_are_closed);
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_few_faces_have_none);

@@ -1,6 +1,8 @@
 #!/bin/sh
 # Builds the Debian packages of the current commit in a clean root: build_deb.sh [-l] [-r] OUT [SUITE]
-#   -l      checks the packages with lintian; its errors and warnings are failures
+# If the web viewer was built (tools/web/dist), the package ebpo contains it.
+#   -l      checks the packages with lintian; its errors and warnings are failures. The viewer is left out,
+#           because lintian requires the sources of all libraries in its scripts
 #   -r      builds again in a different environment, and compares every .deb
 #   OUT     folder for the packages and the source package
 #   SUITE   suite of Debian; default: bookworm
@@ -50,11 +52,16 @@ version=$(sed -n "s/^  version: '\(.*\)',$/\1/p" "$source/meson.build")
 name=ebpo-octree-$version
 # Makes the source package: a tarball of the commit, and debian/ beside meson.build.
 unpack() { # folder in the root
-    rm -rf "${root:?}$1" && mkdir -p "$root$1"
-    git -C "$source" -c tar.umask=022 archive --format=tar --prefix="$name/" HEAD |
-        xz -T1 >"$root$1/ebpo-octree_$version.orig.tar.xz"
-    tar -C "$root$1" -xf "$root$1/ebpo-octree_$version.orig.tar.xz"
-    cp -R "$root$1/$name/tools/packaging/debian" "$root$1/$name/debian"
+    to=${root:?}$1
+    rm -rf "$to" && mkdir -p "$to"
+    set --
+    for file in "$source"/tools/web/dist/*; do
+        [ $lint = yes ] || [ ! -f "$file" ] || set -- "$@" --add-file="$file"
+    done
+    git -C "$source" -c tar.umask=022 archive --format=tar --prefix="$name/tools/web/dist/" "$@" \
+        --prefix="$name/" HEAD | xz -T1 >"$to/ebpo-octree_$version.orig.tar.xz"
+    tar -C "$to" -xf "$to/ebpo-octree_$version.orig.tar.xz"
+    cp -R "$to/$name/tools/packaging/debian" "$to/$name/debian"
 }
 build() { # folder in the root, a command before dpkg-buildpackage...
     folder=$1
