@@ -21,7 +21,7 @@ import tempfile
 import boolean_models
 from boolean_models import OPERATORS, open_edges, pose, random_rotation
 
-POINTS = 1000
+POINTS, GRID = 1000, 16
 SCALES = (1, 1, 1, 0.1, 1e-30, 1e30, 1e-150, 1e150, 2.0 ** -500, 2.0 ** 500)
 RULES = {"nonzero": lambda w: w != 0, "evenodd": lambda w: w % 2 == 1, "positive": lambda w: w > 0}
 
@@ -156,19 +156,30 @@ def random_pose(rng, scale, before):
 # --- exact winding numbers ---
 
 class Exact:
-    """Faces with coordinates as integers, in units of 2^`exponent`."""
+    """Faces with coordinates as integers, in units of 2^`exponent`, in a grid over x and y."""
 
     def __init__(self, vertices, faces, exponent):
         whole = [to_integers(v, exponent) for v in vertices]
         self.exponent, self.corners = exponent, [[whole[i] for i in face] for face in faces]
         self.boxes = [tuple(side(vertices[i][k] for i in face) for k in range(3) for side in (min, max))
                       for face in faces]
+        self.low = [min((box[2 * k] for box in self.boxes), default=0) for k in range(2)]
+        self.size = [max((box[2 * k + 1] for box in self.boxes), default=0) - self.low[k] or 1 for k in range(2)]
+        self.cells = [[[] for _ in range(GRID)] for _ in range(GRID)]
+        for face in zip(self.boxes, self.corners):
+            for row in self.cells[self.cell(face[0][0], 0):self.cell(face[0][1], 0) + 1]:
+                for cell in row[self.cell(face[0][2], 1):self.cell(face[0][3], 1) + 1]:
+                    cell.append(face)
+
+    def cell(self, x, axis):
+        """Return the number of the cell; it never decreases with x."""
+        return int(max(0, min(1, (x - self.low[axis]) / self.size[axis])) * (GRID - 1))
 
     def winding(self, point):
         """Return the winding number; None: the ray from the point upward meets an edge, or a face has the point."""
         x, y, z = point
         p, winding = to_integers(point, self.exponent), 0
-        for (x0, x1, y0, y1, _, z1), corners in zip(self.boxes, self.corners):
+        for (x0, x1, y0, y1, _, z1), corners in self.cells[self.cell(x, 0)][self.cell(y, 1)]:
             if not (x0 <= x <= x1 and y0 <= y <= y1 and z <= z1):
                 continue
             d = [subtract(c, p) for c in corners]
@@ -185,15 +196,16 @@ class Exact:
     def is_near(self, point, margin):
         """Return True if a face may have a distance of at most the margin from the point."""
         p, whole = to_integers(point, self.exponent), to_integers((margin,), self.exponent)[0] + 1
-        sides = [(x - 2 * margin, x + 2 * margin) for x in point]
-        for box, corners in zip(self.boxes, self.corners):
-            if any(box[2 * k] > sides[k][1] or box[2 * k + 1] < sides[k][0] for k in range(3)):
-                continue
-            u, v, w = (subtract(q, corners[0]) for q in (corners[1], corners[2], p))
-            normal = [u[k - 2] * v[k - 1] - u[k - 1] * v[k - 2] for k in range(3)]
-            height = sum(n * x for n, x in zip(normal, w))
-            if height * height <= whole * whole * sum(n * n for n in normal):
-                return True
+        (a0, a1), (b0, b1), (c0, c1) = ((x - 2 * margin, x + 2 * margin) for x in point)
+        for row in self.cells[self.cell(a0, 0):self.cell(a1, 0) + 1]:
+            for cell in row[self.cell(b0, 1):self.cell(b1, 1) + 1]:
+                for (x0, x1, y0, y1, z0, z1), corners in cell:
+                    if x0 <= a1 and x1 >= a0 and y0 <= b1 and y1 >= b0 and z0 <= c1 and z1 >= c0:
+                        u, v, w = (subtract(q, corners[0]) for q in (corners[1], corners[2], p))
+                        normal = [u[k - 2] * v[k - 1] - u[k - 1] * v[k - 2] for k in range(3)]
+                        height = sum(n * x for n, x in zip(normal, w))
+                        if height * height <= whole * whole * sum(n * n for n in normal):
+                            return True
         return False
 
 

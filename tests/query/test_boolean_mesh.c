@@ -664,7 +664,7 @@ static uint64_t list_changed(const scene *s, const ebpo_mesh *changes, corners *
 
 /* Makes a sphere with many faces and a long diagonal drill through it. The drill's box contains all
  * faces of the sphere. */
-static void make_drilled_sphere(scene *s)
+static void make_drilled_sphere(scene *s, uint32_t level)
 {
     const double centre[3] = { 0, 0, 0 }, low[3] = { -4, -0.02, -0.02 },
                  high[3] = { 4, 0.02, 0.02 };
@@ -673,7 +673,7 @@ static void make_drilled_sphere(scene *s)
                                        { 0.48, 0.64, 0.6 } };
     ebpo_pose pose = moved_pose(0, 0, 0);
     memcpy(pose.rotation, turn, sizeof turn);
-    add_operand(s, ebpo_test_sphere(centre, 1, 5), moved_pose(0.25, 0, 0), 3);
+    add_operand(s, ebpo_test_sphere(centre, 1, level), moved_pose(0.25, 0, 0), 3);
     add_operand(s, ebpo_test_box(low, high, 2), pose, 3);
 }
 
@@ -685,7 +685,7 @@ START_TEST(changes)
                                           EBPO_BOOLEAN_SYMMETRIC_DIFFERENCE };
     const double centre[3] = { 0, 0, 0 };
     uint64_t kept = 0, compared = 0;
-    for (uint32_t i = 0; i < 44; i++) {
+    for (uint32_t i = 0; i < 50; i++) {
         uint64_t state = i + 1;
         double small[3] = { 0.1, 0.2, 0.3 };
         ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
@@ -696,7 +696,7 @@ START_TEST(changes)
             add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0.25 * (i % 3), 0, 0),
                         3 * i);
         if (i >= 40)
-            make_drilled_sphere(&s);
+            make_drilled_sphere(&s, i < 44 ? 5 : 4);
         else if (i % 5 == 0)
             add_operand(&s, ebpo_test_sphere(centre, 1, 3), moved_pose(0, 0, 0), 3);
         else
@@ -704,6 +704,14 @@ START_TEST(changes)
         s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 0, 0, 0 };
         s.node[s.nodes++] = (ebpo_boolean_node){ EBPO_BOOLEAN_OPERAND, 1, 0, 0 };
         s.node[s.nodes++] = (ebpo_boolean_node){ operations[i % 4], 0, 1, 0 };
+        if (i >= 44) { /* cut by planes and a box, of which the sphere sticks out */
+            static const double plane[2][4] = { { 0, 0, 1, 0.3 }, { 3, 1, -2, 0.1 } },
+                                box[6] = { -2, -2, -0.5, 2, 0.5, 2 };
+            memcpy(s.plane, plane, sizeof plane);
+            memcpy(s.box, box, sizeof box);
+            s.planes = i % 3;
+            s.boxed = i % 3 != 1;
+        }
         ebpo_boolean *boolean = make_boolean(&s, 2);
         ASSERT_OK(ebpo_boolean_mesh(boolean, &options, &whole, NULL, error));
         options.changed_only = true;
@@ -731,25 +739,79 @@ START_TEST(changes)
 }
 END_TEST
 
-/* Few faces of the sphere are listed. */
-START_TEST(few_faces_near_drill)
+/* Few faces of the sphere are listed: near a drill; near a plane through the sphere; near a box
+ * that contains half of the sphere. */
+START_TEST(few_faces_near_cut)
 {
-    scene s = { .nodes = 3,
-                .node = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
-                          { EBPO_BOOLEAN_OPERAND, 1, 0, 0 },
-                          { EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 } } };
-    ebpo_base_face *near;
-    uint64_t count;
-    make_drilled_sphere(&s);
-    ebpo_boolean *boolean = make_boolean(&s, 1);
-    ASSERT_OK(ebpo_base_faces_find(boolean, &near, &count, error));
-    ck_assert_uint_gt(count, 0);
-    ck_assert_uint_lt(count, s.model[0].mesh.face_count / 2);
-    for (uint64_t i = 1; i < count; i++)
-        ck_assert_uint_lt(near[i - 1].file_face, near[i].file_face);
-    free(near);
-    ebpo_boolean_free(boolean);
-    free_scene(&s);
+    const double low[3] = { -2, -2, -2 }, high[3] = { 2, 0.01, 2 };
+    for (int i = 0; i < 3; i++) {
+        scene s = { .nodes = i == 1 ? 1 : 3,
+                    .node = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 },
+                              { EBPO_BOOLEAN_OPERAND, 1, 0, 0 },
+                              { EBPO_BOOLEAN_DIFFERENCE, 0, 1, 0 } },
+                    .plane = { { 0.1, 0.2, 1, 0.05 } },
+                    .planes = i == 1 };
+        ebpo_base_faces near;
+        make_drilled_sphere(&s, 5);
+        if (i == 2) {
+            s.node[1].left = 2;
+            add_operand(&s, ebpo_test_box(low, high, 1), moved_pose(0, 0, 0), 3);
+        }
+        uint64_t faces = s.model[0].mesh.face_count, differ = 0;
+        ebpo_boolean *boolean = make_boolean(&s, 1);
+        ASSERT_OK(ebpo_base_faces_find(boolean, 1, NULL, &near, error));
+        ck_assert_uint_gt(near.count, 0);
+        ck_assert_uint_lt(near.count, faces / 2);
+        for (uint64_t f = 1; f < near.count; f++)
+            ck_assert_uint_lt(near.face[f - 1].file_face, near.face[f].file_face);
+        for (uint64_t f = 0; f < faces && near.differs; f++)
+            differ += near.differs[f / 64] >> f % 64 & 1;
+        if (i)
+            ck_assert_uint_gt(differ, faces / 4);
+        ebpo_base_faces_free(&near);
+        ebpo_boolean_free(boolean);
+        free_scene(&s);
+    }
+}
+END_TEST
+
+/* The search for changed faces reports progress up to its end, and stops on request. */
+static bool note_progress(void *user, const char *stage, uint64_t done, uint64_t total)
+{
+    double *last = user; /* the last reported share; the search is stopped after last[1] */
+    if (strcmp(stage, "find changed faces") == 0) {
+        double share = (double)done / (double)total;
+        ck_assert_double_ge(share, last[0]);
+        last[0] = share;
+    }
+    return last[0] <= last[1];
+}
+
+START_TEST(progress_of_changes)
+{
+    for (int i = 0; i < 2; i++) {
+        double last[2] = { 0, i ? 0.3 : 1 };
+        ebpo_boolean_mesh_options options = EBPO_BOOLEAN_MESH_OPTIONS_INIT;
+        ebpo_mesh mesh;
+        ebpo_error got = EBPO_ERROR_INIT;
+        scene s = { .nodes = 1,
+                    .node = { { EBPO_BOOLEAN_OPERAND, 0, 0, 0 } },
+                    .plane = { { 0.1, 0.2, 1, 0.05 } },
+                    .planes = 1 };
+        make_drilled_sphere(&s, 5);
+        ebpo_boolean *boolean = make_boolean(&s, 1);
+        options.changed_only = true;
+        options.progress = (ebpo_progress){ note_progress, last };
+        ebpo_status status = ebpo_boolean_mesh(boolean, &options, &mesh, NULL, &got);
+        ck_assert_int_eq(status, i ? EBPO_E_CANCELLED : EBPO_OK);
+        if (i)
+            ck_assert_str_eq(got.message, "stopped on request during find changed faces");
+        else
+            ck_assert_double_gt(last[0], 0.8);
+        ebpo_mesh_free(&mesh);
+        ebpo_boolean_free(boolean);
+        free_scene(&s);
+    }
 }
 END_TEST
 
@@ -772,15 +834,14 @@ START_TEST(long_faces_near_sheet)
     }
     for (uint64_t v = 0; v < sheet.vertex_count; v++)
         sheet.xyz64[3 * v + 2] += slope * (sheet.xyz64[3 * v] + 1);
-    ebpo_base_face *near;
-    uint64_t count;
+    ebpo_base_faces near;
     add_operand(&s, plates, moved_pose(0, 0, 0), 3);
     add_operand(&s, sheet, moved_pose(0, 0, 0), 3);
     ebpo_boolean *boolean = make_boolean(&s, 1);
-    ASSERT_OK(ebpo_base_faces_find(boolean, &near, &count, error));
-    ck_assert_uint_gt(count, s.model[0].mesh.face_count / 2);
-    ck_assert_uint_le(count, s.model[0].mesh.face_count);
-    free(near);
+    ASSERT_OK(ebpo_base_faces_find(boolean, 1, NULL, &near, error));
+    ck_assert_uint_gt(near.count, s.model[0].mesh.face_count / 2);
+    ck_assert_uint_le(near.count, s.model[0].mesh.face_count);
+    ebpo_base_faces_free(&near);
     ebpo_boolean_free(boolean);
     free_scene(&s);
 }
@@ -859,7 +920,8 @@ TEST_SUITE(boolean_mesh)
     tcase_add_test(tests, regions);
     tcase_add_test(tests, refused_regions);
     tcase_add_test(tests, changes);
-    tcase_add_test(tests, few_faces_near_drill);
+    tcase_add_test(tests, few_faces_near_cut);
+    tcase_add_test(tests, progress_of_changes);
     tcase_add_test(tests, long_faces_near_sheet);
     tcase_add_test(tests, refused_changes);
     tcase_add_test(tests, equal_for_any_threads);

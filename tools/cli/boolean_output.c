@@ -99,7 +99,8 @@ ebpo_status boolean_write_result(boolean_output *o, ebpo_boolean *b, ebpo_progre
                 o->path, ebpo_mesh_attributes_lost(&mesh));
     o->vertices = mesh.vertex_count;
     o->faces = mesh.face_count;
-    if (mesh.face_count == 0 && !words_end_with(o->path, ".ply")) {
+    o->is_empty = mesh.face_count == 0 && !o->changed_only;
+    if (o->is_empty && !words_end_with(o->path, ".ply")) {
         error->status = status = EBPO_E_ABSENT;
         snprintf(error->message, sizeof error->message,
                  "%s: the result is empty, but an .ebpo.h5 file cannot be empty; write a .ply file",

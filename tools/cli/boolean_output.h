@@ -19,6 +19,7 @@ typedef struct boolean_output {
     ebpo_workspace *workspace; /* limits the memory for the exact result; NULL: no limit */
     /* results of boolean_write_result */
     uint64_t vertices, faces; /* numbers of vertices and faces that were written */
+    bool is_empty;            /* the result has no faces */
     ebpo_boolean_mesh_report report;
     uint64_t temporary;      /* greatest size of the temporary files, in bytes */
     uint64_t crossing_pairs; /* if `crossings`: number of pairs of intersecting faces; rounded

@@ -387,31 +387,53 @@ static ebpo_status check_reversed(const ebpo_cut_mesh *cut, const int8_t *sign,
 
 /* --- all of it --- */
 
+/* Makes a bit for each corner: 1 for two corners of each listed face of the base without area. */
+static uint64_t *mark_flat(const ebpo_face_list *faces)
+{
+    uint64_t *flat = ebpo_alloc_zero(faces->given_corners / 64 + 1, sizeof *flat);
+    for (uint32_t f = faces->first[0]; f < faces->first[1] && flat; f++)
+        for (int i = 1; i < 3 && faces->face[f][0] == EBPO_NO_CORNER; i++)
+            ebpo_set_bit(flat, faces->face[f][i]);
+    return flat;
+}
+
 /* Returns true if each edge occurs in the selected triangles equally often in both directions.
  *
  * An edge of only one triangle is not tested if the triangle's face is whole. Then the edge's other
  * face is a whole face of the same component that is not listed. If the faces of the base that are
  * not listed stay in the result (keeps_base), the difference between the selected triangles and all
  * triangles of the base is tested. The base is closed, so the result is closed if this difference
- * is closed. */
-static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const int8_t *sign)
+ * is closed.
+ *
+ * If faces of the base that are not listed may stay or be removed (base_differs), one of the two
+ * tests must succeed. The faces around an edge of a face that is not listed all stay, or are all
+ * removed, because no other operand has a face there. flat (mark_flat): listed faces without area
+ * have no triangles and the state of keeps_base, so only the first test is correct at their edges.
+ */
+static bool is_closed(const ebpo_cut_mesh *cut, const edge_lists *e, const uint64_t *flat,
+                      const int8_t *sign)
 {
+    const ebpo_face_list *faces = cut->faces;
     for (uint64_t i = 0, next, all = 3 * cut->count, v = 0; i < all; i = next) {
-        int64_t balance = 0;
-        uint32_t operand;
+        int64_t balance = 0, base = 0; /* of the selected triangles, and of the base */
+        uint32_t operand, other = other_vertex(e->edge[i]);
         while (e->begin[v + 1] <= i)
             v++;
-        for (next = i;
-             next < e->begin[v + 1] && other_vertex(e->edge[next]) == other_vertex(e->edge[i]);
-             next++) {
+        for (next = i; next < e->begin[v + 1] && other_vertex(e->edge[next]) == other; next++) {
             uint32_t t = triangle_of(e->edge[next]);
-            int s = sign[t];
-            if (cut->faces->keeps_base && ebpo_face_list_operand(cut->faces, cut->face[t]) == 0)
-                s--;
-            balance += e->edge[next] & 1 ? -s : s;
+            int direction = e->edge[next] & 1 ? -1 : 1;
+            balance += direction * sign[t];
+            base += ebpo_face_list_is_base(faces, ebpo_face_list_operand(faces, cut->face[t]))
+                        ? direction
+                        : 0;
         }
-        if (balance != 0 && (next - i > 1 || component_of(cut, triangle_of(e->edge[i]), &operand) ==
-                                                 EBPO_NO_COMPONENT))
+        if (balance == (faces->keeps_base ? base : 0) ||
+            (next - i == 1 &&
+             component_of(cut, triangle_of(e->edge[i]), &operand) != EBPO_NO_COMPONENT))
+            continue;
+        bool given = other < faces->given_corners && v < faces->given_corners;
+        if (!faces->base_differs || balance != (faces->keeps_base ? 0 : base) ||
+            (given && (ebpo_has_bit(flat, v) || ebpo_has_bit(flat, other))))
             return false;
     }
     return true;
@@ -421,10 +443,12 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
                                    int8_t **sign, uint64_t *patches, ebpo_error *error)
 {
     edge_lists e = { 0 };
+    uint64_t *flat = mark_flat(cut->faces);
     uint32_t *parent = ebpo_alloc(cut->count, sizeof *parent);
     *sign = ebpo_alloc_zero(cut->count, sizeof **sign);
-    ebpo_status status =
-        parent && *sign ? EBPO_OK : ebpo_fail_memory(error, cut->count * (sizeof *parent + 1));
+    ebpo_status status = parent && *sign && flat
+                             ? EBPO_OK
+                             : ebpo_fail_memory(error, cut->count * (sizeof *parent + 1));
     if (status == EBPO_OK && !ebpo_progress_stage(progress, "join patches", error))
         status = EBPO_E_CANCELLED;
     if (status == EBPO_OK)
@@ -435,7 +459,7 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
     }
     if (status == EBPO_OK)
         status = classify_patches(cut, parent, progress, *sign, patches, error);
-    if (status == EBPO_OK && !is_closed(cut, &e, *sign))
+    if (status == EBPO_OK && !is_closed(cut, &e, flat, *sign))
         status =
             cut->faces->changed_only
                 ? ebpo_fail(error, EBPO_E_UNSUPPORTED, "operand 1 is cut where %s", base_not_simple)
@@ -445,6 +469,7 @@ ebpo_status ebpo_cut_mesh_classify(const ebpo_cut_mesh *cut, const ebpo_progress
     if (status == EBPO_OK && cut->faces->changed_only)
         status = check_reversed(cut, *sign, progress, error);
     free_edges(&e);
+    free(flat);
     free(parent);
     return status;
 }

@@ -161,24 +161,27 @@ static ebpo_status list_faces(ebpo_face_list *faces, uint32_t operand, const ebp
 }
 
 /* Lists the faces of the base near other operands. */
-static ebpo_status list_base(ebpo_face_list *faces, ebpo_error *error)
+static ebpo_status list_base(ebpo_face_list *faces, const ebpo_progress *progress,
+                             ebpo_error *error)
 {
     const ebpo_boolean *b = faces->boolean;
-    ebpo_base_face *near;
-    uint64_t count;
+    ebpo_base_faces near;
     faces->keeps_base = ebpo_boolean_holds(b, faces->equal[0]);
-    ebpo_status status = ebpo_base_faces_find(b, &near, &count, error);
+    ebpo_status status = ebpo_base_faces_find(b, faces->equal[0], progress, &near, error);
     if (status == EBPO_OK) {
-        faces->base_source = ebpo_alloc(count, sizeof *faces->base_source);
+        faces->base_source = ebpo_alloc(near.count, sizeof *faces->base_source);
         bool listed_all = faces->base_source != NULL;
-        for (uint64_t i = 0; i < count && listed_all; i++) {
-            faces->base_source[i] = near[i].source;
-            listed_all = list_face(faces, (const double(*)[3])near[i].corner, near[i].file_face);
+        for (uint64_t i = 0; i < near.count && listed_all; i++) {
+            const ebpo_base_face *f = &near.face[i];
+            faces->base_source[i] = f->source;
+            listed_all = list_face(faces, (const double(*)[3])f->corner, f->file_face);
         }
         if (!listed_all)
-            status = ebpo_fail_memory(error, count * sizeof *near);
+            status = ebpo_fail_memory(error, near.count * sizeof *near.face);
+        faces->base_differs = near.differs;
+        near.differs = NULL;
     }
-    free(near);
+    ebpo_base_faces_free(&near);
     return status;
 }
 
@@ -195,7 +198,7 @@ static ebpo_status read_operands(ebpo_face_list *faces, const ebpo_progress *pro
         if (!ebpo_progress_stage(progress, "read faces", error))
             return EBPO_E_CANCELLED;
         if (ebpo_face_list_is_base(faces, i)) {
-            status = list_base(faces, error);
+            status = list_base(faces, progress, error);
             continue;
         }
         status = ebpo_operand_mesh_read(&mesh, b, i, false, faces->workspace, error);
@@ -309,6 +312,7 @@ void ebpo_face_list_free(ebpo_face_list *faces)
     for (uint32_t i = 0; i < faces->boolean->count; i++)
         ebpo_whole_faces_free(&faces->whole[i]);
     free(faces->base_source);
+    free(faces->base_differs);
     free(faces->negative_zeros);
     free(faces->face);
     free(faces->file_face);

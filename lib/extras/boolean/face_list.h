@@ -33,9 +33,13 @@ typedef struct ebpo_face_list {
     uint64_t equal[EBPO_BOOLEAN_OPERANDS_MAX];
     ebpo_whole_faces whole[EBPO_BOOLEAN_OPERANDS_MAX]; /* [operand] */
     /* changed_only: the result gives only the changes of operand 0, the *base*. Then all faces of
-     * the base near other operands are listed, and no face of the base counts as whole. keeps_base:
-     * the base's faces that are not listed bound the result; if false, none of them does. */
+     * the base near the surfaces of other operands are listed, and no face of the base counts as
+     * whole. keeps_base: the base's faces outside all other operands bound the result; if false,
+     * none of them does. base_differs: for each other face of the base that is not listed, a bit
+     * that is 1 if the face bounds the result and keeps_base is false, or the reverse; NULL: all
+     * bits are 0. */
     bool changed_only, keeps_base;
+    uint64_t *base_differs;
     uint32_t *base_source;   /* for each listed face of the base: its source index */
     ebpo_operand_pair *pair; /* intersecting pairs; freed when the partners are listed */
     /* The partners of face i, which intersect it and have an area, are partner[begin[i]] to

@@ -388,6 +388,18 @@ static bool add_removed(output *o, uint64_t first, uint64_t count)
     return true;
 }
 
+/* Adds the ranges of removed faces among faces of the base that are not listed, [first, end). */
+static bool add_unlisted(output *o, uint64_t first, uint64_t end)
+{
+    const ebpo_face_list *faces = o->cut->faces;
+    if (!faces->base_differs)
+        return faces->keeps_base || add_removed(o, first, end - first);
+    bool added = true;
+    for (uint64_t f = first; f < end && added; f++)
+        added = faces->keeps_base != ebpo_has_bit(faces->base_differs, f) || add_removed(o, f, 1);
+    return added;
+}
+
 /* Adds the triangles of the changed faces of the base (operand 0), and the ranges of removed faces.
  * A listed face is not changed if it is one triangle that bounds the result. */
 static bool add_changes(operand_output *r)
@@ -406,7 +418,7 @@ static bool add_changes(operand_output *r)
                      : end - t == 1 && o->sign[t] > 0 &&
                            memcmp(cut->triangle[t], faces->face[f], sizeof cut->triangle[t]) == 0;
         uint64_t file_face = faces->file_face[f];
-        if (!faces->keeps_base && !add_removed(o, after, file_face - after))
+        if (!add_unlisted(o, after, file_face))
             return false;
         if (!kept && !add_removed(o, file_face, 1))
             return false;
@@ -416,7 +428,7 @@ static bool add_changes(operand_output *r)
         after = file_face + 1;
     }
     uint64_t all = faces->boolean->solid[0].model->info->face_count;
-    return faces->keeps_base || add_removed(o, after, all - after);
+    return add_unlisted(o, after, all);
 }
 
 static ebpo_status read_maps(operand_output *r, ebpo_error *error)

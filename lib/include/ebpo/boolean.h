@@ -370,8 +370,9 @@ typedef struct ebpo_boolean_mesh_options {
      * that are not faces of the result. Indices are indices in the file of operand 0.
      * ebpo_mesh_write_ply writes `removed` as an element. The mesh and the faces of operand 0
      * outside these ranges together are the result. Self-intersections of operand 0 are not cut, so
-     * faces that stay may intersect each other. Only the part of operand 0 near the other operands
-     * is read, and its faces must fit in memory. `volume` and `attributes` must be false.
+     * faces that stay may intersect each other. Only the part of operand 0 near or in the other
+     * operands is read, and its faces near their surfaces must fit in memory, as must reversed
+     * faces. `volume` and `attributes` must be false.
      */
     bool changed_only;
 

@@ -383,10 +383,12 @@ static int make_cells(const values *v, const boolean_nodes *nodes, const boolean
     ebpo_progress progress = progress_start(&line, "boolean", v->query.json);
     ebpo_status status = compute_cells(&a, b, progress, &error);
     progress_wipe(&line);
-    if (status != EBPO_OK)
-        return command_failed("boolean", &error);
+    bool empty = a.output.is_empty;
+    if (status != EBPO_OK) {
+        int code = command_failed("boolean", &error);
+        return empty && status == EBPO_E_ABSENT ? EXIT_EMPTY : code;
+    }
     print_cells(&a);
-    bool empty = writes_result(v) && !v->changed_only && a.output.faces == 0;
     if (empty)
         fprintf(stderr, "ebpo boolean: %s: warning: the result is empty\n", v->out);
     return !command_flush("boolean") ? EXIT_FAILED : empty ? EXIT_EMPTY : EXIT_OK;
