@@ -431,6 +431,15 @@ class Meshes(Case):
         self.check(types.SimpleNamespace(vertices=vertices, triangles=faces.astype(np.int32)), "open3d")
         self.check(square, "pyvista")
         self.check(self.mesh, "arrays")
+        tensors = [types.SimpleNamespace(cpu=lambda array=array: types.SimpleNamespace(numpy=lambda: array))
+                   for array in (vertices, faces.astype(np.int64))]
+        self.check(types.SimpleNamespace(vertex=types.SimpleNamespace(positions=tensors[0]),
+                                         triangle=types.SimpleNamespace(indices=tensors[1])), "tensors")
+        self.check(types.SimpleNamespace(geometry={}, to_mesh=lambda: types.SimpleNamespace(vertices=vertices, faces=faces)),
+                   "scene")
+        grid = types.SimpleNamespace(points=vertices, triangulate=lambda: types.SimpleNamespace(points=vertices))
+        with self.assertRaisesRegex(TypeError, "extract_surface"):
+            ebpo.convert(grid, "never.ebpo.h5")
         for wrong in (17, types.SimpleNamespace(points=vertices), [1, 2, 3]):
             with self.assertRaisesRegex(TypeError, "trimesh"):
                 ebpo.convert(wrong, "never.ebpo.h5")
@@ -449,17 +458,23 @@ class Meshes(Case):
         np.testing.assert_array_equal(made.mesh(order="source").faces, self.mesh.faces)
         np.testing.assert_allclose(made.bounds, mesh.bounds, rtol=1e-6)
         self.assertAlmostEqual(made.volume, mesh.volume, 5)
+        scene = importlib.import_module("trimesh").Scene(mesh)
+        self.same(ebpo.convert(scene, "of_trimesh.ebpo.h5", overwrite=True).mesh(order="source"), made.mesh(order="source"))
 
     def test_open3d(self):
         o3d = self.package("open3d")
         mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(self.mesh.vertices.astype(float)),
                                          o3d.utility.Vector3iVector(self.mesh.faces.astype(np.int32)))
-        made = ebpo.convert(mesh, "of_open3d.ebpo.h5", overwrite=True).mesh(order="source")
-        self.same(made, self.mesh)
+        for given in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
+            made = ebpo.convert(given, "of_open3d.ebpo.h5", overwrite=True).mesh(order="source")
+            self.same(made, self.mesh)
 
     def test_pyvista(self):
         self.package("pyvista")
-        self.check(model("scan").to_pyvista(), "of_pyvista")
+        mesh = model("scan").to_pyvista()
+        self.check(mesh, "of_pyvista")
+        with self.assertRaisesRegex(TypeError, "extract_surface"):
+            ebpo.convert(mesh.cast_to_unstructured_grid(), "never.ebpo.h5")
 
 
 if __name__ == "__main__":

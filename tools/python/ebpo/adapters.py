@@ -17,11 +17,17 @@ if TYPE_CHECKING:
 def arrays_of(mesh: Any) -> tuple[Any, Any]:
     """Return the vertices and faces of a pair of arrays, or of a mesh of trimesh, Open3D or PyVista.
 
-    Polygons of PyVista become triangles. Raises TypeError for other objects.
+    Polygons of PyVista become triangles. Scenes of trimesh become one mesh. Raises TypeError for other objects.
     """
     if hasattr(mesh, "points") and hasattr(mesh, "triangulate"):  # PyVista
-        faces = np.asarray(mesh.triangulate().faces)
-        return np.asarray(mesh.points), faces.reshape(-1, 4)[:, 1:]
+        flat = mesh.triangulate()
+        if not hasattr(flat, "faces"):  # cells of volumes
+            raise TypeError(f"{type(mesh).__name__} of PyVista has no faces; convert its extract_surface()")
+        return np.asarray(mesh.points), np.asarray(flat.faces).reshape(-1, 4)[:, 1:]
+    if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):  # tensors of Open3D
+        return mesh.vertex.positions.cpu().numpy(), mesh.triangle.indices.cpu().numpy()
+    if hasattr(mesh, "geometry") and hasattr(mesh, "to_mesh"):  # trimesh.Scene
+        mesh = mesh.to_mesh()
     for name in ("faces", "triangles"):  # trimesh, Open3D
         if hasattr(mesh, "vertices") and hasattr(mesh, name):
             return np.asarray(mesh.vertices), np.asarray(getattr(mesh, name))

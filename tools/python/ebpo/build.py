@@ -38,8 +38,9 @@ def convert(mesh: AnyMesh, output: Path, *, overwrite: bool = False, parts: str 
             temp_dir: Path | None = None, threads: int | None = None, progress: Progress | None = None) -> Model:
     """Convert a mesh to an .ebpo.h5 file, which is written atomically, and open it.
 
-    mesh: the path of a PLY, OBJ, STL or OFF; (vertices, faces); or a mesh of trimesh, Open3D or PyVista, of which
-        vertices and faces are used. vertices: (v, 3); float32 is stored as float32, other types as float64.
+    mesh: the path of a PLY, OBJ, STL or OFF; (vertices, faces); a mesh or scene of trimesh; a mesh of Open3D; or
+        PolyData of PyVista. Vertices and faces are used. vertices: (v, 3); float32 is stored as float32, other types
+        as float64.
         faces: (f, 3) integers.
     overwrite: replace an existing file. False: raise ExistingFileError, which is a FileExistsError.
     parts: as `ebpo convert --parts`: the parts to store, such as

@@ -135,5 +135,25 @@ class PolygonData(Protocol):
     def triangulate(self) -> Any: ...
 
 
+class VertexAndTriangle(Protocol):
+    """A mesh such as open3d.t.geometry.TriangleMesh."""
+
+    @property
+    def vertex(self) -> Any: ...
+
+    @property
+    def triangle(self) -> Any: ...
+
+
+class Geometries(Protocol):
+    """A scene such as trimesh.Scene."""
+
+    @property
+    def geometry(self) -> Any: ...
+
+    def to_mesh(self) -> Any: ...
+
+
 #: Meshes of `ebpo.convert`: a path, (vertices, faces), or an object of trimesh, Open3D or PyVista.
-AnyMesh = Union[Path, "tuple[ArrayLike, ArrayLike]", VerticesAndFaces, VerticesAndTriangles, PolygonData]
+AnyMesh = Union[Path, "tuple[ArrayLike, ArrayLike]", VerticesAndFaces, VerticesAndTriangles, PolygonData,
+                VertexAndTriangle, Geometries]
