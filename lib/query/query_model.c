@@ -570,8 +570,10 @@ void ebpo_context_free(ebpo_context *c)
     free(c);
 }
 
-/* Returns EBPO_E_LIMIT, with a message that gives a budget which is sufficient for this subtree. */
-static ebpo_status fail_budget(const ebpo_model *m, uint32_t below, ebpo_error *error)
+/* Called after EBPO_E_LIMIT. If the budget is smaller than the estimate for this subtree, replaces
+ * the message by one that gives a sufficient budget. Otherwise keeps it: the limit is another one,
+ * or the subtree exceeds its estimate, or other threads use the memory. */
+static ebpo_status fail_limit(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;
     if (estimate_subtree((ebpo_model *)m, ebpo_subtree_key(below, true), &peak, &keep, NULL) !=
@@ -580,6 +582,8 @@ static ebpo_status fail_budget(const ebpo_model *m, uint32_t below, ebpo_error *
     least = m->top->bytes + peak;
     while (m->top->bytes + ebpo_bytes_besides_subtrees(&m->options, least) + peak > least)
         least += least / 8 + 1;
+    if (least <= m->options.memory)
+        return EBPO_E_LIMIT;
     return ebpo_fail(error, EBPO_E_LIMIT,
                      "the memory budget of %" PRIu64
                      " bytes is too small for one subtree below level %d and the memory in use; "
@@ -608,7 +612,7 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     c->loaded += !hit;
     if (status != EBPO_OK)
         return status == EBPO_E_LIMIT && m->options.memory && !m->options.budget
-                   ? fail_budget(m, below, error)
+                   ? fail_limit(m, below, error)
                    : status;
     *out = c->pinned = item;
     c->pinned_key = key;

@@ -308,21 +308,43 @@ static void casting_keep(casting *c, const ebpo_ray_found *m)
     }
 }
 
-/* Sorts hits. A few hits are sorted by insertion, which is fast because the hits are nearly in
- * order: the nearest boxes are visited first. */
+/* Orders by the rounded t, then by the order of the file. */
+static int compare_rounded(const void *a, const void *b, void *unused)
+{
+    const ebpo_ray_found *x = a, *y = b;
+    (void)unused;
+    if (x->intersection.t != y->intersection.t)
+        return x->intersection.t < y->intersection.t ? -1 : 1;
+    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+}
+
+/* Sorts by insertion, which is fast for a few hits in nearly the right order. */
+static void insert_found(ebpo_ray_found *found, uint64_t count,
+                         int (*compare)(const void *, const void *, void *), ebpo_segment *ray)
+{
+    for (uint64_t i = 1; i < count; i++) {
+        uint64_t at = i;
+        if (compare(&found[i - 1], &found[i], ray) <= 0)
+            continue;
+        ebpo_ray_found m = found[i];
+        do {
+            found[at] = found[at - 1];
+            at--;
+        } while (at > 0 && compare(&found[at - 1], &m, ray) > 0);
+        found[at] = m;
+    }
+}
+
+/* Sorts hits. A few hits are first sorted by their rounded t. After this, the exact order rarely
+ * differs, so nearly all exact comparisons, which are slow, are between neighbours. */
 static void sort_found(ebpo_ray_found *found, uint64_t count, ebpo_segment *ray)
 {
     if (count > 16) {
         ebpo_sort_with(found, count, sizeof *found, compare_found, ray);
         return;
     }
-    for (uint64_t i = 1; i < count; i++) {
-        uint64_t at = i;
-        ebpo_ray_found m = found[i];
-        for (; at > 0 && compare_found(&found[at - 1], &m, ray) > 0; at--)
-            found[at] = found[at - 1];
-        found[at] = m;
-    }
+    insert_found(found, count, compare_rounded, NULL);
+    insert_found(found, count, compare_found, ray);
 }
 
 /* Writes all hits in order, without duplicates, to context->hits from `begin` to *end. */

@@ -266,7 +266,7 @@ function makePage({ info, counts, first, queries: { many, one, theirs }, native,
   for (const name of Object.keys(many))
     most(`${name}: batch / native portable kernels`, 2.5, many[name] / native.portable[name]);
   most('cold distance near the surface: requests', 12, counts.near[1]);
-  most('cold distance near the surface: bytes', 350000, counts.near[2]);
+  most('cold distance near the surface: bytes', 430000, counts.near[2]);
   if (memory)
     most(`memory.buffer, ${short(memory.faces)} faces by URL, MiB`, 512, memory.heap / 2 ** 20);
   most('ebpo.wasm with gzip, bytes', 400000, packed.gzip);

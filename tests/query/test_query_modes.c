@@ -155,6 +155,60 @@ START_TEST(test_results_same_for_any_budget)
 }
 END_TEST
 
+/* Queries each point with another context, so that each context keeps a subtree, until the budget
+ * is used up. Returns false if the budget is too small for a query, or if all points have results.
+ */
+static bool use_up(const fixture *a, ebpo_model *model, ebpo_error *why)
+{
+    ebpo_context **context = query_alloc(a->count, sizeof(ebpo_context *));
+    ebpo_distance_result result;
+    uint64_t count = 0;
+    ebpo_status status = EBPO_OK;
+    memset(context, 0, a->count * sizeof(ebpo_context *));
+    ASSERT_OK(ebpo_context_new(model, &context[0], error));
+    for (uint64_t i = 0; i < a->count && status == EBPO_OK; i++)
+        status = ebpo_distance(context[0], a->points + 3 * i, NULL, &result, why);
+    bool suffices = status == EBPO_OK;
+    while (status == EBPO_OK && ++count < a->count) {
+        ASSERT_OK(ebpo_context_new(model, &context[count], error));
+        status = ebpo_distance(context[count], a->points + 3 * count, NULL, &result, why);
+    }
+    for (uint64_t i = 0; i < a->count; i++)
+        ebpo_context_free(context[i]);
+    free(context);
+    return suffices && status == EBPO_E_LIMIT;
+}
+
+/* The budget is large enough for each subtree, so a message that it is not would be wrong. */
+START_TEST(test_limit_of_subtrees_in_use_has_its_message)
+{
+    fixture a;
+    bool used_up = false, resident = false;
+    query_model_make(&a.m, cases[0].name, query_solid_by_name(cases[0].name),
+                     &query_variants[cases[0].variant]);
+    reserve_space(&a, 100);
+    query_make_points(&a.m, a.count, 1, a.points);
+    for (uint64_t budget = 4096; !used_up && !resident; budget += budget / 16) {
+        ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+        ebpo_model_stats stats = EBPO_MODEL_STATS_INIT;
+        ebpo_error why = EBPO_ERROR_INIT;
+        ebpo_model *model = NULL;
+        how.memory = budget;
+        how.cut_level = 1;
+        if (ebpo_model_new(a.m.file, &how, &model, &why) != EBPO_OK)
+            continue;
+        ebpo_model_get_stats(model, &stats);
+        resident = stats.resident;
+        used_up = use_up(&a, model, &why);
+        ck_assert_msg(!used_up || strstr(why.message, "are in use, and one subtree more"), "%s",
+                      why.message);
+        ebpo_model_free(model);
+    }
+    ck_assert(used_up);
+    end(&a);
+}
+END_TEST
+
 /* --- forms of queries --- */
 
 START_TEST(test_batches_match_single_queries)
@@ -648,6 +702,7 @@ TEST_SUITE(query_modes)
     tcase_set_timeout(threads, 1000);
     tcase_add_loop_test(tests, test_results_same_in_all_load_modes, 0, CASES);
     tcase_add_loop_test(tests, test_results_same_for_any_budget, 0, CASES);
+    tcase_add_test(tests, test_limit_of_subtrees_in_use_has_its_message);
     tcase_add_loop_test(tests, test_batches_match_single_queries, 0, CASES);
     tcase_add_loop_test(tests, test_results_ignore_warm_start_and_sign, 0, CASES);
     tcase_add_loop_test(tests, test_results_beyond_max_distance_are_omitted, 0, CASES);

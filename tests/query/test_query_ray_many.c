@@ -22,6 +22,22 @@ EBPO_EIGHT f8 decode_sides(const uint8_t *x)
 #define EBPO_KERNEL_SUFFIX counted
 #include "query/ray_kernels.c"
 
+/* Counts the exact comparisons of hits; the linker passes calls to __wrap_. */
+static uint64_t compared;
+int __real_ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
+                            const ebpo_ray_intersection *at_a, const double b[3][3],
+                            const ebpo_ray_intersection *at_b);
+int __wrap_ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
+                            const ebpo_ray_intersection *at_a, const double b[3][3],
+                            const ebpo_ray_intersection *at_b);
+int __wrap_ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
+                            const ebpo_ray_intersection *at_a, const double b[3][3],
+                            const ebpo_ray_intersection *at_b)
+{
+    compared++;
+    return __real_ebpo_ray_compare(ray, a, at_a, b, at_b);
+}
+
 typedef struct results {
     ebpo_ray_hit *first;
     bool *any;
@@ -238,6 +254,29 @@ START_TEST(test_coherent_rays_share_nodes)
 }
 END_TEST
 
+/* A ray through a vertex hits all faces around it at the same t. */
+START_TEST(test_hits_at_vertex_need_few_exact_comparisons)
+{
+    query_model m;
+    uint64_t hits = 0, count;
+    const double down[3] = { 0, 0, -1 };
+    const ebpo_ray_hit *found;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    compared = 0;
+    for (uint64_t i = 0; i < m.mesh.vertex_count; i++) {
+        double from[3];
+        ebpo_test_point(&m.mesh, (uint32_t)i, from);
+        from[2] += 4;
+        ASSERT_OK(ebpo_ray_all(m.context, from, down, INFINITY, &found, &count, error));
+        hits += count;
+    }
+    ck_assert_uint_gt(hits, 8 * m.mesh.vertex_count);
+    ck_assert_msg(compared < 2 * hits, "%llu comparisons of %llu hits",
+                  (unsigned long long)compared, (unsigned long long)hits);
+    query_model_free(&m);
+}
+END_TEST
+
 /* --- closed solids --- */
 
 /* Aims from p approximately towards a vertex or a point of an edge or face; returns false when
@@ -346,6 +385,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
     tcase_add_test(many, test_coherent_rays_share_nodes);
+    tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
     tcase_add_loop_test(tight, test_rays_detect_inside_of_solids, 0, query_solid_count());

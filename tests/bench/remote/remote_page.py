@@ -76,7 +76,7 @@ def goals():
     yield "close-up, nodes: requests", lambda f, s: f.values(s, "view", "requests"), 20
     yield "close-up, nodes: bytes", lambda f, s: f.values(s, "view", "bytes"), 1e6
     for row, subject, requests, size in (("distance deep small", "deep inside", 30, 1e6),
-                                         ("ray eye small", "rays from one eye", 80, 1.5e6)):
+                                         ("ray eye small", "rays from one eye", 80, 7.2e6)):
         for what, most in ("requests", requests), ("bytes", size):
             yield f"{subject}: {what}", lambda f, s, a=(row, what): f.values(s, *a), most
     yield "levels 0 to 5: requests", lambda f, s: f.values(s, "levels 5", "requests"), 1
