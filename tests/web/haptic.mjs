@@ -2,39 +2,18 @@
 // A recorded device writes a letter, which must be in the picture, in the file and in the baked mesh; also in a scene. Then the mouse of the page is the device.
 // Exits with 77 (skipped) when Chromium or the viewer's packages are not installed; tools/install-deps.sh --tests installs them.
 import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { TIMEOUT, begin, idle } from './live_page.mjs';
 
-const [ebpo, generate, root] = process.argv.slice(2), viewer = join(root, 'tools/web');
-const chromium = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
-if (!chromium || !['playwright-core', 'esbuild'].every((name) => existsSync(join(viewer, 'node_modules', name)))) {
-  console.log('skipped: chromium or tools/web/node_modules is missing; run tools/install-deps.sh --tests');
-  process.exit(77);
-}
-const { chromium: playwright } = await import(pathToFileURL(join(viewer, 'node_modules/playwright-core/index.mjs')));
+const [ebpo, generate, root] = process.argv.slice(2), viewer = join(root, 'tools/web'), { launch, deviceOn } = await begin(ebpo, root);
 const { readPaint } = await import(pathToFileURL(join(viewer, 'paint/paint_file.js')));
-const work = mkdtempSync(join(tmpdir(), 'ebpo-haptic-')), page = join(work, 'viewer'), TIMEOUT = { timeout: 120000, polling: 50 };
+const work = mkdtempSync(join(tmpdir(), 'ebpo-haptic-')), page = join(work, 'viewer');
 const run = (program, ...args) => execFileSync(program, args, { encoding: 'utf8' });
-const at = (name) => join(work, name), model = at('ball.ebpo.h5');
-
-// Starts a device with a page of the model. Returns its address, and functions that end it and return its report and messages.
-const device = (...options) => deviceOn(model, ...options);
-async function deviceOn(what, ...options) {
-  const process_ = spawn(ebpo, ['haptic', '--json', '--view', '--port', '0', '--viewer', page, ...options, what], { stdio: ['ignore', 'pipe', 'pipe'] });
-  let out = '', err = '';
-  process_.stdout.on('data', (text) => (out += text));
-  const address = await new Promise((done) => process_.stderr.on('data', (text) => {
-    err += text;
-    const found = /http:\/\/127\.0\.0\.1:\d+\//.exec(err);
-    if (found)
-      done(found[0]);
-  }));
-  const ended = new Promise((done) => process_.once('exit', (code) => done({ code, report: code === 0 ? JSON.parse(out) : undefined, get err() { return err; } })));
-  return { address, ended, stop: () => process_.kill('SIGINT'), get err() { return err; } };
-}
+const at = (name) => join(work, name), model = at('ball.ebpo.h5'), device = (...options) => deviceOn(page, model, ...options);
 
 const strokesOf = (name) => readPaint(new Uint8Array(readFileSync(at(name)))).strokes;
 const bare = (strokes) => strokes.map(({ points, ...s }) => ({ ...s, points: points.map(({ face, weights, place, size, pressure, time }) => ({ face, weights, place, size, pressure, time })) }));
@@ -57,7 +36,6 @@ const onLetter = ([x, y]) => Math.min(...[0, 1].map((k) => {
   return Math.hypot(x - a[0] - t * d[0], y - a[1] - t * d[1]);
 }));
 
-const idle = (tab) => tab.waitForFunction(() => window.ebpoViewer?.state.idle && window.ebpoViewer.live, undefined, TIMEOUT);
 // Returns for points of the model whether the picture has the colour of the paint there.
 const painted = (tab, points) => tab.evaluate(async (all) => {
   const { scene, place: { center, scale } } = window.ebpoViewer;
@@ -78,7 +56,6 @@ async function testRecording(tab) {
   const haptic = await device('--path', at('letter.txt'), '--paint', at('letter.paint.h5'), '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
   await tab.goto(`${haptic.address}?file=models/0/ball.ebpo.h5&live=live&view=0,0,2.6`);
   await idle(tab);
-  await tab.waitForFunction(() => window.ebpoViewer.live.connected, undefined, TIMEOUT);
   const programs = () => tab.evaluate(() => window.ebpoViewer.scene.renderer.info.programs.length), compiled = await programs();
   await tab.waitForFunction(() => window.ebpoViewer.live.ended, undefined, TIMEOUT);
   assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
@@ -123,10 +100,9 @@ async function testScene(tab) {
   const box = { translation: [-0.28, 0, 0.8], scale: 0.4 };
   writeFileSync(side, JSON.stringify({ ebpo_scene: '1.0', models: { ball: { file: 'ball.ebpo.h5' }, box: { file: 'box.ebpo.h5' } }, cameras: [{ name: 'front', eye: [0, 0, 9],
     target: [0, 0, 0], up: [0, 1, 0] }], instances: [{ name: 'one', model: 'ball' }, { name: 'box', model: 'box', pose: box }, { name: 'two', model: 'ball', pose }] }));
-  const haptic = await deviceOn(side, '--path', at('letter.txt'), '--paint', folder, '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
+  const haptic = await deviceOn(page, side, '--path', at('letter.txt'), '--paint', folder, '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
   await tab.goto(`${haptic.address}?scene=scene.json&live=live&view=-40,0,1.7`);
   await idle(tab);
-  await tab.waitForFunction(() => window.ebpoViewer.live.connected, undefined, TIMEOUT);
   const programs = () => tab.evaluate(() => window.ebpoViewer.scene.renderer.info.programs.length), compiled = await programs();
   await tab.waitForFunction(() => window.ebpoViewer.live.ended, undefined, TIMEOUT);
   assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
@@ -249,8 +225,7 @@ run(ebpo, 'convert', '-q', at('ball.ply'), model);
 writeFileSync(at('box.obj'), [...[0, 1, 2, 3, 4, 5, 6, 7].map((i) => `v ${i & 1} ${i >> 1 & 1} ${i >> 2}\n`),
   ...['1 3 4 2', '5 6 8 7', '1 2 6 5', '3 7 8 4', '1 5 7 3', '2 4 8 6'].map((f) => `f ${f}\n`)].join(''));
 run(ebpo, 'convert', '-q', at('box.obj'), at('box.ebpo.h5'));
-const flags = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
-const browser = await playwright.launch({ executablePath: chromium, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
+const browser = await launch();
 try {
   const tab = await browser.newPage({ viewport: { width: 480, height: 360 } }), complaints = [];
   tab.on('pageerror', (e) => complaints.push(e.stack));

@@ -93,8 +93,8 @@ class Haptic:
     """
 
     def __init__(self, model: Model | Scene, position: ArrayLike, *, time: float | None = None, radius: float = 0.0,
-                 points: ArrayLike | None = None, probe: bool = False, skin: float = 0.0, search_radius: float = 0.0, stiffness: float = 400.0,
-                 damping: float = 0.4, friction: float = 0.0, step_seconds: float = 0.001,
+                 points: ArrayLike | None = None, probe: bool = False, skin: float = 0.0, search_radius: float = 0.0,
+                 stiffness: float = 400.0, damping: float = 0.4, friction: float = 0.0, step_seconds: float = 0.001,
                  faces: int = 16384) -> None:
         self._process = os.getpid()
         wanted = made(c.ebpo_haptic_options, radius=radius, skin=skin, search_radius=search_radius, stiffness=stiffness,
