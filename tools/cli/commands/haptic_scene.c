@@ -10,7 +10,8 @@
 #include "cli/commands/haptic_device.h"
 #include "cli/json.h"
 
-static ebpo_status fail_scene(ebpo_error *error, ebpo_status status, const char *name, const char *what)
+static ebpo_status fail_scene(ebpo_error *error, ebpo_status status, const char *name,
+                              const char *what)
 {
     *error = (ebpo_error){ .status = status, .offset = -1 };
     snprintf(error->message, sizeof error->message, "%.200s: %s", name, what);
@@ -97,21 +98,19 @@ ebpo_status haptic_scene_open(haptic_scene *s, const char *name, const ebpo_load
     return status == EBPO_OK ? get_instances(s, counts.begin, error) : status;
 }
 
-/* Returns false if the file has text that is not a record. Files that do not exist or cannot be
- * read are left to the function that writes the record. */
+/* Returns false if a regular file has text that is not a record. All else is left to the function
+ * that writes the record. */
 static bool is_record(const char *path)
 {
-    char *line = NULL;
-    size_t capacity = 0;
-    ssize_t length;
+    char line[1024];
+    struct stat st;
     haptic_pose pose;
     int count = 0;
-    FILE *in = fopen(path, "r");
-    while (in && count == 0 && (length = getline(&line, &capacity, in)) >= 0)
-        count = haptic_pose_read(line, (size_t)length, &pose);
+    FILE *in = stat(path, &st) == 0 && S_ISREG(st.st_mode) ? fopen(path, "r") : NULL;
+    while (in && count == 0 && fgets(line, sizeof line, in))
+        count = haptic_pose_read(line, strlen(line), &pose);
     if (in)
         fclose(in);
-    free(line);
     return count >= 0;
 }
 
@@ -151,15 +150,17 @@ static ebpo_status set_paint(haptic_scene *s, uint64_t number, const char *folde
     haptic_surface *surface = &s->surfaces[number];
     char *path = NULL;
     if (strpbrk(surface->name, "/\\:") || surface->name[0] == '.')
-        return fail_scene(error, EBPO_E_ARGUMENT, surface->name,
-                    "this name of a model cannot be the name of its paint file, because it begins "
-                    "with '.' or has a '/', '\\' or ':'; rename the model in the scene");
+        return fail_scene(
+            error, EBPO_E_ARGUMENT, surface->name,
+            "this name of a model cannot be the name of its paint file, because it begins "
+            "with '.' or has a '/', '\\' or ':'; rename the model in the scene");
     if (asprintf(&path, "%s/%s.paint.h5", folder, surface->name) < 0)
-        return fail_scene(error, EBPO_E_MEMORY, folder, "not enough memory for the paths of paint files");
+        return fail_scene(error, EBPO_E_MEMORY, folder,
+                          "not enough memory for the paths of paint files");
     surface->paint = s->paint_paths[number] = path;
     if (record && (strcmp(path, record) == 0 || command_same_file(path, record)))
         return fail_scene(error, EBPO_E_ARGUMENT, record,
-                    "is both the record and a paint file; choose another output");
+                          "is both the record and a paint file; choose another output");
     return EBPO_OK;
 }
 
@@ -169,15 +170,17 @@ ebpo_status haptic_scene_paint_in(haptic_scene *s, const char *folder, const cha
     struct stat st;
     ebpo_status status = EBPO_OK;
     if (s->surface_count > HAPTIC_PAINTS_MAX)
-        return fail_scene(error, EBPO_E_LIMIT, s->name,
-                    "the scene has more than 64 models with instances, the most for --paint; make "
-                    "a scene of the models to be painted");
+        return fail_scene(
+            error, EBPO_E_LIMIT, s->name,
+            "the scene has more than 64 models with instances, the most for --paint; make "
+            "a scene of the models to be painted");
     if (mkdir(folder, 0777) != 0 && errno != EEXIST)
         return fail_scene(error, EBPO_E_IO, folder, strerror(errno));
     if (stat(folder, &st) != 0 || !S_ISDIR(st.st_mode))
-        return fail_scene(error, EBPO_E_ARGUMENT, folder,
-                    "is not a folder; with a scene, --paint names a folder, which gets a paint "
-                    "file for each model");
+        return fail_scene(
+            error, EBPO_E_ARGUMENT, folder,
+            "is not a folder; with a scene, --paint names a folder, which gets a paint "
+            "file for each model");
     for (uint64_t i = 0; i < s->surface_count && status == EBPO_OK; i++)
         status = set_paint(s, i, folder, record, error);
     return status;
