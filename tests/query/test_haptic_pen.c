@@ -188,6 +188,9 @@ START_TEST(test_pen_paints_instances)
         haptic_painted painted;
         t.pen.poses = poses;
         ASSERT_OK(haptic_paints_open(&paints, &t.pen, surfaces, 2, of, error));
+        haptic_sample unknown = touch_at(0, 0.8, 1); /* paints nothing */
+        unknown.instance = UINT64_MAX;
+        haptic_paints_take(paints, &unknown, 1);
         touch_instances(paints, poses);
         ck_assert(!haptic_paints_command(paints, "layer 0"));
         ck_assert(haptic_paints_command(paints, "new-layer second"));

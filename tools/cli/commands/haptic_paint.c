@@ -619,8 +619,8 @@ static bool is_same(const haptic_paint *p, const haptic_sample *s)
  * caller has the lock. */
 static bool touch_instance(haptic_paint *p, const haptic_sample *s)
 {
-    if (is_same(p, s))
-        return true;
+    if (is_same(p, s)) /* the pose of a first step may not be known */
+        return !p->pen.poses || p->instance != UINT64_MAX || !is_touching(s);
     if (p->instance != UINT64_MAX && s->time - p->touched <= p->lost_ms)
         return false;
     lift_pen(p);
