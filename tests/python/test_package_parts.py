@@ -10,6 +10,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import time
 import types
 
 from package_support import COMMAND, EXTRAS, Case, model, np, points, run
@@ -279,6 +280,24 @@ class Parts(Case):
         self.assertGreater(moved.vertices[:, 0].min(), 3)
         with self.assertRaisesRegex(ValueError, "3 models, but 1 poses"):
             ebpo.boolean("A", [scene], poses=[None])
+        def stepped(step, device):   # waits until the faces near the device are loaded
+            end = time.monotonic() + 60
+            while (result := step(device)).face < 0 or result.flags & 2:
+                self.assertLess(time.monotonic(), end)
+            return result
+
+        haptic = ebpo.Haptic(scene, [9, 0, 3], radius=.1, time=0)   # above the third ball
+        result = stepped(haptic.step, [9, 0, .75])
+        self.assertEqual((result.instance, result.stopped), (2, False))
+        self.assertGreater(result.proxy[2], .9)
+        probe = ebpo.Haptic(scene, [0, 0, 5], probe=True)
+        self.assertEqual(stepped(probe.step_probe, [10, 0, 0]).instance, 2)
+        with self.assertRaisesRegex(ValueError, "time belongs to a scene"):
+            ebpo.Haptic(model("scan"), [0, 0, 5], time=1)
+        scene.close()   # the objects keep the models
+        self.assertEqual(haptic.step([9, 0, .75]).instance, 2)
+        with self.assertRaisesRegex(ValueError, "closed"):
+            ebpo.Haptic(scene, [9, 0, 3])
         with self.assertRaises(ebpo.FormatError):
             pathlib.Path("bad.scene.json").write_text("{}")
             ebpo.open_scene("bad.scene.json")

@@ -13,7 +13,7 @@
 #include "check_main.h"
 #include "cli/command.h"
 #include "cli/commands/haptic_device.h"
-#include "cli/commands/haptic_paint.h"
+#include "cli/commands/haptic_paints.h"
 #include "query_support.h"
 
 int command_thread(pthread_t *thread, void *(*body)(void *), void *argument)
@@ -122,6 +122,87 @@ START_TEST(test_pen_is_lifted_after_lost_steps)
     ck_assert_uint_eq(strokes_with_gap(1, 31), 2);
     ck_assert_uint_eq(strokes_with_gap(50, 0), 1);
     ck_assert_uint_eq(strokes_with_gap(50, 1), 2);
+}
+END_TEST
+
+/* Returns a step in contact with an instance, on the top of its cube at x of the model. */
+static haptic_sample touch_instance(double time, const ebpo_pose *poses, uint64_t instance,
+                                    double x)
+{
+    haptic_sample s = touch_at(time, x, 1);
+    for (int k = 0; k < 3; k++)
+        s.touch[k] = poses[instance].translation[k] + poses[instance].scale * s.touch[k];
+    s.instance = instance;
+    return s;
+}
+
+/* Touches instance 0 of a cube in turns with its instance 1, which is twice as large, so that the
+ * pen stays on the first one. Then touches instance 1, and then instance 2, of another cube; some
+ * steps do not know the instance. */
+static void touch_instances(haptic_paints *paints, const ebpo_pose *poses)
+{
+    for (int i = 0; i < 300; i++) {
+        bool other = i < 100 && i % 2;
+        haptic_sample s =
+            touch_instance(i + (i < 100 ? 0 : 50), poses, other ? 1 : (uint64_t)i / 100,
+                           other ? 0.7 : 0.2 + 0.002 * (i % 100));
+        if (i > 200 && i % 3 == 0)
+            s.instance = UINT64_MAX;
+        haptic_paints_take(paints, &s, 1);
+    }
+}
+
+/* Checks the strokes of a file: each goes from x = 0.2 to 0.4. Returns their number. */
+static uint64_t check_strokes(pen_test *t, const char *path)
+{
+    ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
+    ebpo_paint_free(t->made);
+    ASSERT_OK(ebpo_paint_open(path, &t->made, error));
+    ebpo_paint_get_info(t->made, &info);
+    for (uint64_t i = 0; i < info.stroke_count; i++) {
+        ebpo_paint_stroke stroke = stroke_at(t, i);
+        ck_assert_double_eq(stroke.radius, i == 1 ? radius / 2 : radius);
+        ck_assert_double_eq_tol(stroke.points[0].place[0], 0.2, 1e-9);
+        ck_assert_double_eq_tol(stroke.points[stroke.point_count - 1].place[0], 0.39, 0.011);
+    }
+    return info.stroke_count;
+}
+
+/* A pen paints the models of the touched instances, in their coordinates and files. It is lifted
+ * between two instances of a model. Undo removes the last contact of all models. */
+START_TEST(test_pen_paints_instances)
+{
+    static const uint64_t expected[4][2] = { { 2, 1 }, { 2, 0 }, { 1, 0 }, { 0, 0 } };
+    static const uint64_t of[3] = { 0, 0, 1 };
+    ebpo_pose poses[3] = { EBPO_POSE_INIT, EBPO_POSE_INIT, EBPO_POSE_INIT };
+    poses[1].translation[0] = poses[1].scale = 2;
+    poses[2].translation[0] = -3;
+    for (int undos = 0; undos < 4; undos++) {
+        pen_test t;
+        begin(&t);
+        char other[sizeof t.path + 8];
+        snprintf(other, sizeof other, "%s.other", t.path);
+        const haptic_surface surfaces[2] = { { "one", t.path, t.m.file, t.m.model },
+                                             { "two", other, t.m.file, t.m.model } };
+        haptic_paints *paints;
+        haptic_painted painted;
+        t.pen.poses = poses;
+        ASSERT_OK(haptic_paints_open(&paints, &t.pen, surfaces, 2, of, error));
+        haptic_sample unknown = touch_at(0, 0.8, 1); /* paints nothing */
+        unknown.instance = UINT64_MAX;
+        haptic_paints_take(paints, &unknown, 1);
+        touch_instances(paints, poses);
+        ck_assert(!haptic_paints_command(paints, "layer 0"));
+        ck_assert(haptic_paints_command(paints, "new-layer second"));
+        for (int i = 0; i < undos; i++)
+            ck_assert(haptic_paints_command(paints, "undo"));
+        ASSERT_OK(haptic_paints_close(paints, &painted, error));
+        ck_assert_uint_eq(check_strokes(&t, t.path), expected[undos][0]);
+        ck_assert_uint_eq(check_strokes(&t, other), expected[undos][1]);
+        ck_assert_uint_eq(painted.strokes, expected[undos][0] + expected[undos][1]);
+        remove(other);
+        end(&t);
+    }
 }
 END_TEST
 
@@ -573,6 +654,7 @@ Suite *test_suite(void)
     TCase *tc = tcase_create("haptic_pen");
     tcase_set_timeout(tc, 300);
     tcase_add_test(tc, test_pen_is_lifted_after_lost_steps);
+    tcase_add_test(tc, test_pen_paints_instances);
     tcase_add_test(tc, test_pen_has_least_step);
     tcase_add_test(tc, test_pen_slices_are_equal);
     tcase_add_test(tc, test_pen_opacity_follows_pressure);

@@ -1,39 +1,19 @@
 // Shows and paints with haptic devices in a headless Chromium: haptic.mjs EBPO GENERATE SOURCE_ROOT
-// A recorded device writes a letter, which must be in the picture, in the file and in the baked mesh. Then the mouse of the page is the device.
+// A recorded device writes a letter, which must be in the picture, in the file and in the baked mesh; also in a scene. Then the mouse of the page is the device.
 // Exits with 77 (skipped) when Chromium or the viewer's packages are not installed; tools/install-deps.sh --tests installs them.
 import assert from 'node:assert/strict';
-import { execFileSync, spawn } from 'node:child_process';
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { execFileSync } from 'node:child_process';
+import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { TIMEOUT, begin, idle } from './live_page.mjs';
 
-const [ebpo, generate, root] = process.argv.slice(2), viewer = join(root, 'tools/web');
-const chromium = ['/usr/bin/chromium', '/usr/bin/chromium-browser'].find(existsSync);
-if (!chromium || !['playwright-core', 'esbuild'].every((name) => existsSync(join(viewer, 'node_modules', name)))) {
-  console.log('skipped: chromium or tools/web/node_modules is missing; run tools/install-deps.sh --tests');
-  process.exit(77);
-}
-const { chromium: playwright } = await import(pathToFileURL(join(viewer, 'node_modules/playwright-core/index.mjs')));
+const [ebpo, generate, root] = process.argv.slice(2), viewer = join(root, 'tools/web'), { launch, deviceOn } = await begin(ebpo, root);
 const { readPaint } = await import(pathToFileURL(join(viewer, 'paint/paint_file.js')));
-const work = mkdtempSync(join(tmpdir(), 'ebpo-haptic-')), page = join(work, 'viewer'), TIMEOUT = { timeout: 120000, polling: 50 };
+const work = mkdtempSync(join(tmpdir(), 'ebpo-haptic-')), page = join(work, 'viewer');
 const run = (program, ...args) => execFileSync(program, args, { encoding: 'utf8' });
-const at = (name) => join(work, name), model = at('ball.ebpo.h5');
-
-// Starts a device with a page. Returns its address, and functions that end it and return its report and messages.
-async function device(...options) {
-  const process_ = spawn(ebpo, ['haptic', '--json', '--view', '--port', '0', '--viewer', page, ...options, model], { stdio: ['ignore', 'pipe', 'pipe'] });
-  let out = '', err = '';
-  process_.stdout.on('data', (text) => (out += text));
-  const address = await new Promise((done) => process_.stderr.on('data', (text) => {
-    err += text;
-    const found = /http:\/\/127\.0\.0\.1:\d+\//.exec(err);
-    if (found)
-      done(found[0]);
-  }));
-  const ended = new Promise((done) => process_.once('exit', (code) => done({ code, report: code === 0 ? JSON.parse(out) : undefined, get err() { return err; } })));
-  return { address, ended, stop: () => process_.kill('SIGINT'), get err() { return err; } };
-}
+const at = (name) => join(work, name), model = at('ball.ebpo.h5'), device = (...options) => deviceOn(page, model, ...options);
 
 const strokesOf = (name) => readPaint(new Uint8Array(readFileSync(at(name)))).strokes;
 const bare = (strokes) => strokes.map(({ points, ...s }) => ({ ...s, points: points.map(({ face, weights, place, size, pressure, time }) => ({ face, weights, place, size, pressure, time })) }));
@@ -56,7 +36,6 @@ const onLetter = ([x, y]) => Math.min(...[0, 1].map((k) => {
   return Math.hypot(x - a[0] - t * d[0], y - a[1] - t * d[1]);
 }));
 
-const idle = (tab) => tab.waitForFunction(() => window.ebpoViewer?.state.idle && window.ebpoViewer.live, undefined, TIMEOUT);
 // Returns for points of the model whether the picture has the colour of the paint there.
 const painted = (tab, points) => tab.evaluate(async (all) => {
   const { scene, place: { center, scale } } = window.ebpoViewer;
@@ -77,7 +56,6 @@ async function testRecording(tab) {
   const haptic = await device('--path', at('letter.txt'), '--paint', at('letter.paint.h5'), '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
   await tab.goto(`${haptic.address}?file=models/0/ball.ebpo.h5&live=live&view=0,0,2.6`);
   await idle(tab);
-  await tab.waitForFunction(() => window.ebpoViewer.live.connected, undefined, TIMEOUT);
   const programs = () => tab.evaluate(() => window.ebpoViewer.scene.renderer.info.programs.length), compiled = await programs();
   await tab.waitForFunction(() => window.ebpoViewer.live.ended, undefined, TIMEOUT);
   assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
@@ -114,6 +92,39 @@ async function testRecording(tab) {
   const delays = await tab.evaluate(() => window.ebpoViewer.live.delays);
   assert.equal(delays.length, 1, 'one contact');
   return delays[0];
+}
+
+// A scene of two spheres and of a box, whose left side is beside the letter: the letter is on both spheres, as they share their paint, and not on the box.
+async function testScene(tab) {
+  const pose = { translation: [0.9, 0.9, 0.5], scale: 0.25, quaternion: [0, 0, 1, 1] }, side = at('side.json'), folder = at('paints');
+  const box = { translation: [-0.28, 0, 0.8], scale: 0.4 };
+  writeFileSync(side, JSON.stringify({ ebpo_scene: '1.0', models: { ball: { file: 'ball.ebpo.h5' }, box: { file: 'box.ebpo.h5' } }, cameras: [{ name: 'front', eye: [0, 0, 9],
+    target: [0, 0, 0], up: [0, 1, 0] }], instances: [{ name: 'one', model: 'ball' }, { name: 'box', model: 'box', pose: box }, { name: 'two', model: 'ball', pose }] }));
+  const haptic = await deviceOn(page, side, '--path', at('letter.txt'), '--paint', folder, '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
+  await tab.goto(`${haptic.address}?scene=scene.json&live=live&view=-40,0,1.7`);
+  await idle(tab);
+  const programs = () => tab.evaluate(() => window.ebpoViewer.scene.renderer.info.programs.length), compiled = await programs();
+  await tab.waitForFunction(() => window.ebpoViewer.live.ended, undefined, TIMEOUT);
+  assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
+  const { code, report, err } = await haptic.ended, file = strokesOf('paints/ball.paint.h5');
+  assert.equal(code, 0, err);
+  assert.deepEqual([report.paint.strokes, file.length, strokesOf('paints/box.paint.h5').length], [1, 1, 0]);
+  const shown = await tab.evaluate(() => window.ebpoViewer.paint.files);
+  assert.deepEqual(Object.keys(shown).sort(), ['ball', 'box']);
+  assert.deepEqual([bare(shown.ball.strokes), shown.box.strokes], [bare(file), []]);
+  const down = (t) => { // on the letter's first line, which the box does not hide
+    const x = LETTER[0][0], y = 0.35 - 0.6 * t;
+    return [x, y, Math.sqrt(1 - x * x - y * y)];
+  };
+  const all = [0, 1 / 3, 2 / 3, 1].map(down), turned = ([x, y, z]) => [0.9 - 0.25 * y, 0.9 + 0.25 * x, 0.5 + 0.25 * z];
+  // Points on the box, within the balls of points of the letter, so that only the faces of these points decide.
+  const beside = file[0].points.filter(({ place: [x, y] }) => Math.abs(x + 0.3) < 0.03 && y > 0.05 && y < 0.3).map(({ place: [x, y, z] }) => ({ from: x, at: [-0.28, y, z + 0.036] }))
+    .filter(({ from }) => Math.hypot(from + 0.28, 0.036) < 0.9 * RADIUS).map((one) => one.at);
+  assert.ok(beside.length > 5, `${beside.length} points`);
+  assert.deepEqual(await painted(tab, [...all, ...all.map(turned)]), Array(8).fill(true));
+  assert.deepEqual(await painted(tab, [...beside, [-0.6, 0, 0.8]]), Array(beside.length + 1).fill(false));
+  const delays = await tab.evaluate(() => window.ebpoViewer.live.delays);
+  assert.equal(delays.length, 1, 'one contact');
 }
 
 // Reads the vertices of a PLY file: float or double coordinates and colours, little-endian.
@@ -211,16 +222,19 @@ async function testLostPage(tab) {
 run('node', join(viewer, 'bundle.mjs'), page);
 run(generate, '--base', 'sphere', '--faces', '5000', at('ball.ply'));
 run(ebpo, 'convert', '-q', at('ball.ply'), model);
-const flags = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'];
-const browser = await playwright.launch({ executablePath: chromium, args: process.getuid() === 0 ? ['--no-sandbox', ...flags] : flags });
+writeFileSync(at('box.obj'), [...[0, 1, 2, 3, 4, 5, 6, 7].map((i) => `v ${i & 1} ${i >> 1 & 1} ${i >> 2}\n`),
+  ...['1 3 4 2', '5 6 8 7', '1 2 6 5', '3 7 8 4', '1 5 7 3', '2 4 8 6'].map((f) => `f ${f}\n`)].join(''));
+run(ebpo, 'convert', '-q', at('box.obj'), at('box.ebpo.h5'));
+const browser = await launch();
 try {
   const tab = await browser.newPage({ viewport: { width: 480, height: 360 } }), complaints = [];
   tab.on('pageerror', (e) => complaints.push(e.stack));
   const delay = await testRecording(tab);
+  await testScene(tab);
   await testMouse(tab);
   await testLostPage(tab);
   assert.deepEqual(complaints, []);
-  console.log(`OK: a recording, the mouse, a lost page; ${Math.round(delay)} ms from contact to drawing`);
+  console.log(`OK: a recording, a scene, the mouse, a lost page; ${Math.round(delay)} ms from contact to drawing`);
 } finally {
   await browser.close();
   rmSync(work, { recursive: true, force: true });

@@ -167,16 +167,23 @@ export class Client {
 
   /** Returns the nearest positions on the faces for points of the model: [{ face, weights, place, normal, distance }]. */
   positions(points) {
+    return this.#query('positions', points);
+  }
+
+  /** Returns the faces that points of paint cover: the result of reachOf() of reach.js. */
+  reach(points) {
+    return this.#query('reach', points);
+  }
+
+  #query(type, points) {
     const id = ++this.queries, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
-    this.worker.post({ type: 'positions', opening: this.opening, id, points });
+    this.worker.post({ type, opening: this.opening, id, points });
     return promise;
   }
 
   /** Returns the first point of the faces on a ray (origin and direction, six numbers), or undefined. */
   async hit(ray) {
-    const id = ++this.queries, promise = new Promise((done, fail) => this.waiting.set(id, { done, fail }));
-    this.worker.post({ type: 'hit', opening: this.opening, id, points: [ray] });
-    return (await promise)[0];
+    return (await this.#query('hit', [ray]))[0];
   }
 
   /** Repeats pending requests. The next look() sends the current view again. */

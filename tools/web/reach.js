@@ -89,16 +89,16 @@ export function connectedFaces(faces, own, centre, radius) {
 }
 
 /**
- * Computes the covered faces of points [{ face, place, radius }]: [{ here, normal, faces }]. `face` is the number that paint files use.
+ * Computes the covered faces of points [{ face, place, radius, always }]: [{ here, normal, faces }]. `face` is the number that paint files use.
  *
  * `here`: 'yes'; 'no' when the named face is not at the point; 'elsewhere' when the file is a subset without the face or without faces near it.
  *
  * `faces` (nine numbers each): the covered faces, when the ball also intersects faces that are not covered. `faces` is undefined when all faces in the ball are
- * covered, when there are too many faces, and for a radius of 0.
+ * covered (unless `always` is true), when there are too many faces, and for a radius of 0.
  */
 export async function reachOf(queries, points) {
   const { info } = queries, tolerance = OFF * Math.hypot(...info.box_size), subset = Boolean(info.subset_of), out = [];
-  for (const { face, place, radius } of points) {
+  for (const { face, place, radius, always } of points) {
     let around = await facesAround(queries, place, Math.max(radius, tolerance));
     const crowded = around === 'many';
     if (crowded) // a smaller ball suffices to find the face
@@ -110,7 +110,7 @@ export async function reachOf(queries, points) {
     }
     const reach = crowded || !(radius > 0) ? undefined : connectedFaces(around.corners, own, place, radius);
     const inBall = reach && around.corners.filter((f) => nearestOnTriangle(place, f, 0)[0] <= radius);
-    const alone = reach && inBall.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length;
+    const alone = reach && (always || inBall.length > reach.filter((i) => nearestOnTriangle(place, around.corners[i], 0)[0] <= radius).length);
     out.push({ here: 'yes', normal: normalOf(around.corners[own]), faces: alone ? Float64Array.from(reach.flatMap((i) => [...around.corners[i]])) : undefined });
   }
   return out;

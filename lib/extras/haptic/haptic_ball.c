@@ -169,6 +169,8 @@ ebpo_status ebpo_haptic_get_stats(const ebpo_haptic *t, ebpo_haptic_stats *out)
         s.memory += ebpo_ball_walk_bytes(t->options.faces);
     if (t->tool)
         s.memory += ebpo_tool_bytes(t->tool);
+    for (uint64_t i = 0; i < t->model_count; i++)
+        s.memory += t->models[i].levels.count * sizeof *t->models[i].levels.node;
     return EBPO_GIVE(ebpo_haptic_stats, out, &s);
 }
 

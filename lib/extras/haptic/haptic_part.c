@@ -16,6 +16,9 @@
 #include "geometry/vec3.h"
 #include "query/query_model.h"
 
+/* Maximum number of nodes of all models that a probe keeps, except for the roots. */
+enum { HELD_NODES = 1 << 17 };
+
 /* Finds the entry of a model. Returns NULL if it has none. */
 static ebpo_haptic_model *find_model(const ebpo_haptic *t, const ebpo_model *model)
 {
@@ -32,8 +35,16 @@ static ebpo_status add_model(ebpo_haptic *t, ebpo_model *model, ebpo_error *erro
     ebpo_status status = ebpo_context_new(model, &m->placing, error);
     if (status == EBPO_OK)
         status = ebpo_context_new(model, &m->loading, error);
-    if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_PROBE)
-        status = ebpo_held_levels_read(model->file, &m->levels, error);
+    return status;
+}
+
+/* Reads the first levels of all models, which share the number of nodes. */
+static ebpo_status read_levels(ebpo_haptic *t, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < t->model_count && status == EBPO_OK; i++)
+        status = ebpo_held_levels_read(t->models[i].model->file, HELD_NODES / t->model_count,
+                                       &t->models[i].levels, error);
     return status;
 }
 
@@ -165,6 +176,8 @@ ebpo_status ebpo_haptic_parts_new(ebpo_haptic *t, const ebpo_haptic_instance *in
         status = make_part(t, &instances[i], posed, error);
         t->slack = fmax(t->slack, rounding_of(&t->part[i]));
     }
+    if (status == EBPO_OK && t->options.kind == EBPO_HAPTIC_PROBE)
+        status = read_levels(t, error);
     return status == EBPO_OK ? sort_parts(t, error) : status;
 }
 

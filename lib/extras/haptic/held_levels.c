@@ -1,10 +1,10 @@
 /* Keeps the first levels of an octree in memory for probes. These levels give bounds of the
  * distance to the surface, and the winding numbers of cells without faces.
  *
- * At most 2^17 nodes of at most 6 levels below the root are kept. A node has its box, its children,
- * a flag for faces in or near its cell, and, if there are no such faces, its winding number. Bounds
- * are certain: they include the rounding of the model's coordinates. The caller limits the number
- * of visited nodes; with a smaller limit the bounds are wider. */
+ * Nodes of at most 6 levels below the root are kept; the caller limits their number. A node has its
+ * box, its children, a flag for faces in or near its cell, and, if there are no such faces, its
+ * winding number. Bounds are certain: they include the rounding of the model's coordinates. The
+ * caller limits the number of visited nodes; with a smaller limit the bounds are wider. */
 #include "core/strict_fp.h"
 
 #include "extras/haptic/held_levels.h"
@@ -17,7 +17,7 @@
 #include "core/error.h"
 #include "geometry/cells.h"
 
-enum { DEEPEST = 6, LIMIT = 1 << 17 };
+enum { DEEPEST = 6 };
 
 static ebpo_status keep_nodes(const ebpo_file *file, const ebpo_subtree_nodes *nodes,
                               ebpo_held_levels *out, ebpo_error *error)
@@ -43,7 +43,8 @@ static ebpo_status keep_nodes(const ebpo_file *file, const ebpo_subtree_nodes *n
     return EBPO_OK;
 }
 
-ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, ebpo_error *error)
+ebpo_status ebpo_held_levels_read(const ebpo_file *file, uint64_t most, ebpo_held_levels *out,
+                                  ebpo_error *error)
 {
     *out = (ebpo_held_levels){ 0 };
     for (int levels = DEEPEST; levels >= 0; levels--) {
@@ -55,7 +56,7 @@ ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out, 
         ebpo_status status = ebpo_subtree_open(file, 1, &options, &tree, error);
         if (status == EBPO_OK)
             status = ebpo_subtree_get_nodes(tree, &nodes);
-        bool fits = status == EBPO_OK && (nodes.node_count <= LIMIT || levels == 0);
+        bool fits = status == EBPO_OK && (nodes.node_count <= most || levels == 0);
         if (fits)
             status = keep_nodes(file, &nodes, out, error);
         ebpo_subtree_close(tree);

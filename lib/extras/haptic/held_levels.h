@@ -24,9 +24,9 @@ typedef struct ebpo_held_levels {
 } ebpo_held_levels;
 
 /* Reads the root and the levels below it: the greatest number of levels, 6 at most, that have at
- * most 2^17 nodes in total. */
-EBPO_MUST_USE ebpo_status ebpo_held_levels_read(const ebpo_file *file, ebpo_held_levels *out,
-                                                ebpo_error *error);
+ * most `most` nodes in total. */
+EBPO_MUST_USE ebpo_status ebpo_held_levels_read(const ebpo_file *file, uint64_t most,
+                                                ebpo_held_levels *out, ebpo_error *error);
 void ebpo_held_levels_free(ebpo_held_levels *levels);
 
 /* Bounds the distance of p from the nearest face by *lo and *hi. Visits the children of at most

@@ -101,7 +101,7 @@ typedef struct ebpo_haptic_options {
 
     /*
      * Maximum number of faces of a box; 64 to 2^20. Four boxes are in memory. They take about 550
-     * bytes per face in total, besides the model's budget.
+     * bytes per face in total, besides the model's budget. A probe also keeps up to 8 MiB of nodes.
      */
     uint64_t faces;
 
@@ -344,8 +344,9 @@ typedef struct ebpo_haptic_probe_result {
  * distance from `position` to the model. The bounds combine three sources in memory:
  * - The near faces, and the sides of these faces on which the probe is. Exact arithmetic tracks
  *   these sides. Within `search_radius` of a face, the result is exact except for rounding.
- * - The first levels of the octree, at most 2^17 nodes. Leaves and gray nodes (nodes with children)
- *   bound the distance. White nodes (outside the solid) and black nodes (inside) give the side.
+ * - The first levels of the octree, at most 2^17 nodes of all models together. Leaves and gray
+ *   nodes (nodes with children) bound the distance. White nodes (outside the solid) and black nodes
+ *   (inside) give the side.
  * - The exact result for an earlier position of the probe, which the loading thread computes. Since
  *   then, the distance has changed by at most the length of the probe's path.
  *
@@ -479,7 +480,7 @@ typedef struct ebpo_haptic_stats {
      */
     double energy, energy_max, longest_step;
 
-    /* Memory of the boxes in bytes. */
+    /* Memory of the boxes, and of a probe's nodes, in bytes. */
     uint64_t memory;
 
     /* load_seconds: total time of loading. load_seconds_max: longest time for one box. */

@@ -1,7 +1,6 @@
 /* ebpo haptic: runs a recorded, simulated or real haptic device at a steady rate, and measures the
  * times of the haptic steps. */
 #include <float.h>
-#include <limits.h>
 #include <math.h>
 #include <signal.h>
 #include <stddef.h>
@@ -15,8 +14,9 @@
 #include "cli/commands/commands.h"
 #include "cli/commands/haptic_device.h"
 #include "cli/commands/haptic_live.h"
-#include "cli/commands/haptic_paint.h"
+#include "cli/commands/haptic_paints.h"
 #include "cli/commands/haptic_play.h"
+#include "cli/commands/haptic_scene.h"
 #include "cli/commands/haptic_view.h"
 #include "cli/json.h"
 #include "cli/model_memory.h"
@@ -45,12 +45,11 @@ static bool is_mouse(const char *device) { return device && strcmp(device, "spac
 
 typedef struct job {
     const values *v;
-    const char *name;                /* FILE, the operand */
-    ebpo_file *file;                 /* NULL: the operand is a scene */
-    ebpo_model *model;               /* NULL: a scene */
-    ebpo_scene *scene;               /* NULL: a model */
-    ebpo_haptic_instance *instances; /* [instance_count] of the scene */
-    uint64_t instance_count;
+    const char *name;       /* FILE, the operand */
+    ebpo_file *file;        /* NULL: the operand is a scene */
+    ebpo_model *model;      /* NULL: a scene */
+    haptic_scene scene;     /* not used with a model */
+    haptic_surface surface; /* the model, for painting */
     double low[3], size[3]; /* box of the model or scene */
     ebpo_haptic *haptic;
     double *points; /* points of the tool, 3 numbers each */
@@ -64,8 +63,8 @@ typedef struct job {
     ebpo_haptic_stats stats;
     ebpo_error stopped; /* status EBPO_OK, or the error that ended loading */
     ebpo_model_stats memory;
-    haptic_view *view;   /* NULL: not requested */
-    haptic_paint *paint; /* NULL: not requested */
+    haptic_view *view;    /* NULL: not requested */
+    haptic_paints *paint; /* NULL: not requested */
     haptic_painted painted;
     ebpo_error paint_error; /* status EBPO_OK, or why paint is missing in the file */
     uint64_t lost;          /* steps that were not painted, because painting was too slow */
@@ -282,91 +281,17 @@ static ebpo_status no_memory(ebpo_error *error, const char *what)
 
 static bool is_scene(const char *name) { return words_end_with(name, ".json"); }
 
-/* Fails if the record would overwrite the file of a model of the scene. */
-static ebpo_status check_models(const job *j, uint64_t model_count, ebpo_error *error)
-{
-    const char *slash = strrchr(j->name, '/');
-    for (uint64_t i = 0; j->v->record && i < model_count; i++) {
-        ebpo_scene_model_facts model = EBPO_SCENE_MODEL_FACTS_INIT;
-        char *path = NULL;
-        (void)ebpo_scene_get_model_facts(j->scene, i, &model);
-        if (asprintf(&path, "%.*s%s", slash ? (int)(slash - j->name) + 1 : 0, j->name, model.path) <
-            0)
-            return no_memory(error, "the paths of the models");
-        bool same = command_same_file(path, j->v->record);
-        free(path);
-        if (!same)
-            continue;
-        *error = (ebpo_error){ .status = EBPO_E_ARGUMENT };
-        snprintf(error->message, sizeof error->message,
-                 "%.200s: is both a model of the scene and output; choose another output",
-                 j->v->record);
-        return EBPO_E_ARGUMENT;
-    }
-    return EBPO_OK;
-}
-
-/* Sets the poses and models of all instances, at the first time of the scene. */
-static ebpo_status get_instances(job *j, double time, ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    for (uint64_t i = 0; i < j->instance_count && status == EBPO_OK; i++) {
-        ebpo_scene_instance instance = EBPO_SCENE_INSTANCE_INIT;
-        (void)ebpo_scene_get_instance(j->scene, i, &instance);
-        status = ebpo_scene_model(j->scene, instance.model, &j->instances[i].model, error);
-        if (status == EBPO_OK)
-            status = ebpo_scene_pose(j->scene, i, time, &j->instances[i].pose, error);
-    }
-    return status;
-}
-
 static ebpo_status open_scene(job *j, uint64_t memory, ebpo_error *error)
 {
     ebpo_load_options load = EBPO_LOAD_OPTIONS_INIT;
-    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
     load.memory = memory;
     load.max_expansion = (uint64_t)j->v->remote.max_expansion;
-    ebpo_status status = ebpo_scene_open(j->name, NULL, &j->scene, error);
-    if (status == EBPO_OK)
-        status = ebpo_scene_load(j->scene, &load, error);
-    if (status != EBPO_OK)
-        return status;
-    (void)ebpo_scene_get_counts(j->scene, &counts);
-    status = check_models(j, counts.models, error);
-    if (status != EBPO_OK)
-        return status;
-    if (counts.instances == 0) {
-        *error = (ebpo_error){ .status = EBPO_E_ARGUMENT };
-        snprintf(error->message, sizeof error->message, "%.200s: the scene has no instances",
-                 j->name);
-        return EBPO_E_ARGUMENT;
-    }
-    j->instance_count = counts.instances;
-    j->instances = calloc(counts.instances, sizeof *j->instances);
-    if (!j->instances)
-        return no_memory(error, "the instances");
-    status = ebpo_scene_box(j->scene, counts.begin, counts.begin, j->low, j->size, error);
-    for (int k = 0; k < 3; k++)
-        j->size[k] -= j->low[k];
-    return status == EBPO_OK ? get_instances(j, counts.begin, error) : status;
-}
-
-/* Returns true if the record would overwrite a model of the scene. */
-static bool overwrites_model(const job *j)
-{
-    ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
-    const char *slash = strrchr(j->name, '/');
-    (void)ebpo_scene_get_counts(j->scene, &counts);
-    for (uint64_t i = 0; i < counts.models; i++) {
-        ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
-        char path[PATH_MAX];
-        (void)ebpo_scene_get_model_facts(j->scene, i, &facts);
-        int folder = slash && facts.path[0] != '/' ? (int)(slash - j->name) + 1 : 0;
-        snprintf(path, sizeof path, "%.*s%s", folder, j->name, facts.path);
-        if (command_overwrites("haptic", path, j->v->record))
-            return true;
-    }
-    return false;
+    ebpo_status status = haptic_scene_open(&j->scene, j->name, &load, error);
+    memcpy(j->low, j->scene.low, sizeof j->low);
+    memcpy(j->size, j->scene.size, sizeof j->size);
+    if (status == EBPO_OK && j->v->paint)
+        status = haptic_scene_paint_in(&j->scene, j->v->paint, j->v->record, error);
+    return status;
 }
 
 static ebpo_status open_model(job *j, uint64_t memory, ebpo_error *error)
@@ -412,9 +337,9 @@ static ebpo_status make_haptic(job *j, const double start[3], ebpo_error *error)
     haptic_options.kind = j->kind;
     haptic_options.points = (const double(*)[3])j->points;
     haptic_options.point_count = j->point_count;
-    if (j->scene)
-        return ebpo_haptic_new_posed(j->instances, j->instance_count, &haptic_options, start,
-                                     &j->haptic, error);
+    if (is_scene(j->name))
+        return ebpo_haptic_new_posed(j->scene.instances, j->scene.instance_count, &haptic_options,
+                                     start, &j->haptic, error);
     return ebpo_haptic_new(j->model, &haptic_options, start, &j->haptic, error);
 }
 
@@ -445,11 +370,11 @@ static double full_force(const job *j)
     return v->full_force > 0 ? v->full_force : v->stiffness * depth;
 }
 
-/* Opens the paint file. */
+/* Opens the paint file, or those of the models of a scene. */
 static ebpo_status open_paint(job *j, ebpo_error *error)
 {
     const values *v = j->v;
-    haptic_pen pen = { .path = v->paint, .pen = EBPO_PAINT_PEN_INIT };
+    haptic_pen pen = { .pen = EBPO_PAINT_PEN_INIT };
     if (!v->paint)
         return EBPO_OK;
     pen.pen.radius = v->pen_radius > 0 ? v->pen_radius : v->radius;
@@ -470,8 +395,13 @@ static ebpo_status open_paint(job *j, ebpo_error *error)
     pen.points = (const double(*)[3])j->points;
     pen.point_count = v->spread > 0 ? 0 : j->point_count; /* a spray paints around the contact */
     pen.skin = v->skin;
-    pen.diagonal = diagonal_of(j);
-    return haptic_paint_open(&j->paint, &pen, j->file, j->model, error);
+    if (is_scene(j->name)) {
+        pen.poses = j->scene.poses;
+        return haptic_paints_open(&j->paint, &pen, j->scene.surfaces, j->scene.surface_count,
+                                  j->scene.surface_of, error);
+    }
+    j->surface = (haptic_surface){ NULL, v->paint, j->file, j->model };
+    return haptic_paints_open(&j->paint, &pen, &j->surface, 1, NULL, error);
 }
 
 static void stop_loop(int number)
@@ -498,6 +428,7 @@ static bool open_view(job *j)
 {
     const values *v = j->v;
     const haptic_view_options view = { .model = j->name,
+                                       .scene = is_scene(j->name) ? &j->scene : NULL,
                                        .viewer = v->viewer,
                                        .port = v->port,
                                        .max_expansion = v->remote.max_expansion,
@@ -520,7 +451,7 @@ static void take_steps(void *user, const haptic_sample *samples, uint64_t count)
 {
     job *j = user;
     if (j->paint)
-        haptic_paint_take(j->paint, samples, count);
+        haptic_paints_take(j->paint, samples, count);
     if (j->view)
         haptic_view_take(j->view, samples, count);
 }
@@ -541,7 +472,7 @@ static ebpo_status play_live(job *j, haptic_play *all, ebpo_error *error)
     j->lost = haptic_live_end(all->live);
     haptic_view_end(j->view);
     j->view = NULL;
-    (void)haptic_paint_close(j->paint, &j->painted, &j->paint_error);
+    (void)haptic_paints_close(j->paint, &j->painted, &j->paint_error);
     j->paint = NULL;
     return played ? EBPO_OK : no_memory(error, "the times of steps");
 }
@@ -567,9 +498,9 @@ static ebpo_status play_device(job *j, const haptic_pose *first, ebpo_error *err
     if (status != EBPO_OK)
         return status;
     ebpo_haptic_get_stats(j->haptic, &j->stats);
-    if (j->scene) {
+    if (is_scene(j->name)) {
         ebpo_scene_stats scene = EBPO_SCENE_STATS_INIT;
-        (void)ebpo_scene_get_stats(j->scene, &scene);
+        (void)ebpo_scene_get_stats(j->scene.scene, &scene);
         j->memory.memory_peak = scene.memory;
         j->memory.loads = scene.loads;
     } else {
@@ -611,7 +542,8 @@ static int run_job(job *j, uint64_t memory)
     ebpo_status status = j->v->record ? ebpo_check_output(j->v->record, &error) : EBPO_OK;
     if (status == EBPO_OK)
         status = is_scene(j->name) ? open_scene(j, memory, &error) : open_model(j, memory, &error);
-    if (status == EBPO_OK && j->scene && j->v->record && overwrites_model(j))
+    if (status == EBPO_OK && is_scene(j->name) && j->v->record &&
+        haptic_scene_overwrites(&j->scene, j->v->record))
         return EXIT_USAGE;
     if (status == EBPO_OK && !open_mouse(j))
         return EXIT_FAILED;
@@ -675,12 +607,6 @@ static int check_values(const values *v, const char *model, uint64_t *memory)
 {
     if (v->memory && !words_read_size(v->memory, memory))
         return command_usage("haptic", "--memory '%s': expected " WORDS_SIZE_EXPECTED, v->memory);
-    if (is_scene(model) && (v->paint || v->view))
-        return command_usage("haptic",
-                             "%s: --paint and --view need one model, not a scene: paint belongs "
-                             "to one model, and the viewer shows one; give the .ebpo.h5 file of "
-                             "an instance",
-                             model);
     if (is_scene(model) && !v->path && !v->device)
         return command_usage("haptic", "%s: a scene needs --path or --device", model);
     if (is_scene(model) && v->remote.compat)
@@ -745,12 +671,11 @@ static int run_haptic(void *given, const char **operand)
                     (!haptic_udp_named(v->device) || haptic_udp_open(&j.device, v->device));
     code = prepared ? run_job(&j, memory) : EXIT_FAILED;
     haptic_view_end(j.view);
-    (void)haptic_paint_close(j.paint, &j.painted, &j.paint_error);
+    (void)haptic_paints_close(j.paint, &j.painted, &j.paint_error);
     ebpo_haptic_free(j.haptic);
     ebpo_model_free(j.model);
     ebpo_close(j.file);
-    ebpo_scene_free(j.scene);
-    free(j.instances);
+    haptic_scene_close(&j.scene);
     if (j.device.end)
         j.device.end(j.device.self);
     free(j.points);

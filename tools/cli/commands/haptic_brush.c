@@ -33,6 +33,29 @@ void haptic_rotate(const double q[4], const double v[3], double out[3])
     out[2] = v[2] + q[3] * t[2] + q[0] * t[1] - q[1] * t[0];
 }
 
+void haptic_to_model(const ebpo_pose *pose, const double from[3], double out[3])
+{
+    for (int k = 0; k < 3; k++)
+        out[k] = from[k];
+    for (int k = 0; pose && k < 3; k++) {
+        out[k] = 0;
+        for (int i = 0; i < 3; i++)
+            out[k] += pose->rotation[i][k] * (from[i] - pose->translation[i]);
+        out[k] /= pose->scale;
+    }
+}
+
+void haptic_to_world(const ebpo_pose *pose, const double from[3], double out[3])
+{
+    for (int i = 0; i < 3; i++)
+        out[i] = from[i];
+    for (int i = 0; pose && i < 3; i++) {
+        out[i] = pose->translation[i];
+        for (int k = 0; k < 3; k++)
+            out[i] += pose->rotation[i][k] * pose->scale * from[k];
+    }
+}
+
 /* --- the tree --- */
 
 static int compare_along(const void *a, const void *b, int axis)
@@ -112,14 +135,15 @@ void haptic_brush_free(haptic_brush *b)
 typedef struct search {
     haptic_brush *brush;
     ebpo_context *context;
+    const ebpo_pose *pose; /* of the model of `context`, or NULL */
     const haptic_sample *sample;
     double near;
     double shift, turn; /* length and angle of the motion from proxy to device */
     ebpo_error *error;
 } search;
 
-static search begin_search(haptic_brush *brush, ebpo_context *context, const haptic_sample *sample,
-                           double near, ebpo_error *error)
+static search begin_search(haptic_brush *brush, ebpo_context *context, const ebpo_pose *pose,
+                           const haptic_sample *sample, double near, ebpo_error *error)
 {
     double shift[3], cosine = 0;
     for (int k = 0; k < 3; k++)
@@ -128,6 +152,7 @@ static search begin_search(haptic_brush *brush, ebpo_context *context, const hap
         cosine += sample->device_rotation[k] * sample->rotation[k];
     return (search){ .brush = brush,
                      .context = context,
+                     .pose = pose,
                      .sample = sample,
                      .near = near,
                      .shift = length_of(shift),
@@ -153,7 +178,16 @@ static ebpo_status find_surface(const search *s, const double point[3], double r
     options.unsigned_distance = true;
     options.max_distance = s->near + s->shift + s->turn * (length_of(point) + radius) + radius;
     place_point(s->sample->rotation, s->sample->proxy, point, out);
-    return ebpo_distance(s->context, out, &options, near, s->error);
+    if (!s->pose)
+        return ebpo_distance(s->context, out, &options, near, s->error);
+    double at[3], found[3];
+    options.max_distance /= s->pose->scale;
+    haptic_to_model(s->pose, out, at);
+    ebpo_status status = ebpo_distance(s->context, at, &options, near, s->error);
+    memcpy(found, near->point, sizeof found);
+    haptic_to_world(s->pose, found, near->point);
+    near->distance *= s->pose->scale;
+    return status;
 }
 
 /* Collects the points that may be pressed in brush->close. Sets *count to their number. */
@@ -208,11 +242,11 @@ static uint32_t spread_step(uint32_t count)
     return step;
 }
 
-ebpo_status haptic_brush_press(haptic_brush *brush, ebpo_context *context,
+ebpo_status haptic_brush_press(haptic_brush *brush, ebpo_context *context, const ebpo_pose *pose,
                                const haptic_sample *sample, double near,
                                double out[HAPTIC_BRUSH_MAX][3], int *count, ebpo_error *error)
 {
-    search s = begin_search(brush, context, sample, near, error);
+    search s = begin_search(brush, context, pose, sample, near, error);
     uint32_t close;
     ebpo_status status = find_close(&s, &close);
     *count = 0;

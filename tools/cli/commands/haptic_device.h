@@ -24,7 +24,7 @@ typedef struct haptic_result {
     double touch[3]; /* in contact: a point of the tool or of the surface, where they touch */
     double depth;    /* as in ebpo_haptic_ball_result; for a probe its distance, which may be NAN */
     double lo, hi;   /* bounds of the distance */
-    uint64_t face;
+    uint64_t face, instance; /* as in ebpo_haptic_ball_result */
     uint32_t flags;
     uint8_t rgb[3]; /* colour of the distance */
     uint8_t where;  /* an ebpo_where */

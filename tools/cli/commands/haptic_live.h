@@ -15,13 +15,14 @@ typedef struct haptic_sample {
     double device_rotation[4];
     double normal[3]; /* of a tool in contact: away from the face */
     double force[3];
-    double touch[3]; /* in contact: the point of contact; otherwise the position of the proxy */
-    double depth;    /* as in ebpo_haptic_ball_result */
-    double pressure; /* of a stylus; 0: the force sets it */
-    uint64_t clock;  /* tool_clock at the end of the step */
-    uint32_t flags;  /* ebpo_haptic_flag bits */
-    bool lifted;     /* the pen of the device does not paint */
-    uint8_t rgb[3];  /* of a probe: colour of the distance */
+    double touch[3];   /* in contact: the point of contact; otherwise the position of the proxy */
+    double depth;      /* as in ebpo_haptic_ball_result */
+    double pressure;   /* of a stylus; 0: the force sets it */
+    uint64_t clock;    /* tool_clock at the end of the step */
+    uint64_t instance; /* in contact: index of the touched instance; UINT64_MAX: not known */
+    uint32_t flags;    /* ebpo_haptic_flag bits */
+    bool lifted;       /* the pen of the device does not paint */
+    uint8_t rgb[3];    /* of a probe: colour of the distance */
 } haptic_sample;
 
 /* Takes `count` successive steps. Called by one thread. */

@@ -55,13 +55,20 @@ static const double LOCK_SECONDS = 1;
 /* The pen is lifted when it was not in contact for this time. Shorter gaps do not end a stroke. */
 static const double LIFT_MS = 30;
 
+/* A contact of this run. */
+typedef struct haptic_contact {
+    uint64_t strokes; /* number of strokes of `drawn` before the contact */
+    double begin;     /* time of its first step */
+} haptic_contact;
+
 struct haptic_paint {
     haptic_pen pen;
-    uint32_t colour;   /* of the pen when it does not erase */
-    double step_least; /* minimum length of a step of the pen */
-    double lost_ms;    /* time between two steps in contact above which steps were lost */
+    uint32_t colour; /* of the pen when it does not erase */
+    double lost_ms;  /* time between two steps in contact above which steps were lost */
     ebpo_context *context;
-    /* Used by the thread that paints. */
+    /* Used by the thread that paints. Its lengths and positions are those of the world. */
+    uint64_t instance;           /* the instance that was touched last; UINT64_MAX: none yet */
+    const ebpo_pose *pose;       /* of this instance; NULL: the model is not posed */
     ebpo_paint_drawing *drawing; /* NULL: the pen is lifted */
     double touched;              /* time of the last sample in contact */
     ebpo_paint_input first;      /* first position of the stroke */
@@ -85,8 +92,8 @@ struct haptic_paint {
     /* Under the lock. */
     pthread_mutex_t lock;
     ebpo_paint *drawn;
-    uint64_t finished; /* number of strokes of `drawn` that will not change */
-    uint64_t *contact; /* [contact_count] number of strokes of `drawn` before each contact */
+    uint64_t finished;       /* number of strokes of `drawn` that will not change */
+    haptic_contact *contact; /* [contact_count] */
     uint64_t contact_count, contact_capacity;
     bool in_contact;     /* the last contact has not ended */
     uint64_t changes;    /* number of changes of `drawn` */
@@ -223,17 +230,18 @@ static bool sync_path(const char *path)
     return synced;
 }
 
-/* Syncs the paint file and its folder if the file was saved since the last call. */
+/* Syncs the paint file and its folder if the file was saved since the last call. A save through a
+ * symbolic link replaces the file to which the link leads. */
 static ebpo_status sync_paint(haptic_paint *p, ebpo_error *error)
 {
-    char folder[PATH_MAX] = ".";
-    const char *slash = strrchr(p->pen.path, '/');
+    char folder[PATH_MAX];
     if (!atomic_exchange(&p->unsynced, false))
         return EBPO_OK;
-    if (slash)
-        snprintf(folder, sizeof folder, "%.*s", (int)(slash - p->pen.path) + 1, p->pen.path);
-    if (sync_path(p->pen.path) && sync_path(folder))
-        return EBPO_OK;
+    if (sync_path(p->pen.path) && realpath(p->pen.path, folder)) {
+        strrchr(folder, '/')[1] = 0;
+        if (sync_path(folder))
+            return EBPO_OK;
+    }
     int number = errno;
     atomic_store(&p->again, true);
     *error = (ebpo_error){ .status = EBPO_E_IO, .offset = -1 };
@@ -318,13 +326,13 @@ static ebpo_status begin_contact(haptic_paint *p, ebpo_error *error)
         return EBPO_OK;
     if (p->contact_count == p->contact_capacity) {
         uint64_t capacity = p->contact_capacity ? 2 * p->contact_capacity : 64;
-        uint64_t *contact = realloc(p->contact, capacity * sizeof *contact);
+        haptic_contact *contact = realloc(p->contact, capacity * sizeof *contact);
         if (!contact)
             return fail_memory(error);
         p->contact = contact;
         p->contact_capacity = capacity;
     }
-    p->contact[p->contact_count++] = info_of(p->drawn).stroke_count;
+    p->contact[p->contact_count++] = (haptic_contact){ info_of(p->drawn).stroke_count, p->touched };
     p->in_contact = true;
     return EBPO_OK;
 }
@@ -386,13 +394,24 @@ static uint64_t stroke_time(const haptic_paint *p)
     return p->pen.dated ? 1000 * (uint64_t)time(NULL) : 0;
 }
 
+/* Returns the scale of the touched instance. */
+static double scale_of(const haptic_paint *p) { return p->pose ? p->pose->scale : 1; }
+
+/* Returns the shortest step of the pen, in the unit of the world. */
+static double least_step(const haptic_paint *p)
+{
+    return SHORTEST_STEP * p->pen.diagonal * scale_of(p);
+}
+
 /* Begins a stroke. The caller has the lock. */
 static ebpo_status begin_stroke(haptic_paint *p, ebpo_error *error)
 {
     ebpo_paint_pen pen = p->pen.pen;
-    double reach = fmax(pen.radius, pen.spread);
-    pen.step = fmax(reach / 2, p->step_least);
-    pen.within = fmax(reach, p->step_least); /* nothing is painted through the air */
+    double reach = fmax(pen.radius, pen.spread), scale = scale_of(p);
+    pen.step = fmax(reach / 2, least_step(p)) / scale;
+    pen.within = fmax(reach, least_step(p)) / scale; /* nothing is painted through the air */
+    pen.radius /= scale;
+    pen.spread /= scale;
     pen.pressure_step = 0x1p-4;
     pen.seed = 1 + info_of(p->drawn).stroke_count;
     pen.time = stroke_time(p);
@@ -417,14 +436,19 @@ static ebpo_paint_input input_of(const haptic_paint *p, const haptic_sample *s)
     return input;
 }
 
-/* Paints successive steps in contact. The caller has the lock. */
+/* Paints successive steps in contact, at most SLICE + 1. The caller has the lock. */
 static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64_t count)
 {
     ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_paint_input on_model[SLICE + 1];
+    for (uint64_t i = 0; i < count; i++) {
+        on_model[i] = input[i];
+        haptic_to_model(p->pose, input[i].place, on_model[i].place);
+    }
     uint64_t before = info_of(p->drawn).point_count;
     ebpo_status status = p->drawing ? EBPO_OK : begin_stroke(p, &error);
     if (status == EBPO_OK)
-        status = ebpo_paint_drawing_add(p->drawing, input, count, NULL, &error);
+        status = ebpo_paint_drawing_add(p->drawing, on_model, count, NULL, &error);
     p->changes += info_of(p->drawn).point_count > before;
     if (status != EBPO_OK)
         report_painting(p, &error);
@@ -435,15 +459,16 @@ static void paint_contact(haptic_paint *p, const ebpo_paint_input *input, uint64
 static ebpo_status take_print(haptic_paint *p, const haptic_sample *sample, double pressure,
                               ebpo_error *error)
 {
-    double place[HAPTIC_BRUSH_MAX][3], least = p->pen.pen.size_least;
+    double place[HAPTIC_BRUSH_MAX][3], on_model[3], least = p->pen.pen.size_least;
     int count;
     /* the proxy keeps the skin from the surface */
-    double near = fmax(0x1p-12 * p->pen.diagonal, 2 * p->pen.skin);
+    double near = fmax(0x1p-12 * p->pen.diagonal * scale_of(p), 2 * p->pen.skin);
     ebpo_status status =
-        haptic_brush_press(p->brush, p->context, sample, near, place, &count, error);
+        haptic_brush_press(p->brush, p->context, p->pose, sample, near, place, &count, error);
     for (int i = 0; i < count && status == EBPO_OK; i++) {
         ebpo_paint_point *q = &p->prints[p->print_count];
-        status = ebpo_paint_locate(p->drawn, p->context, place[i], q, error);
+        haptic_to_model(p->pose, place[i], on_model);
+        status = ebpo_paint_locate(p->drawn, p->context, on_model, q, error);
         q->size = (uint16_t)(FULL_SIZE * (least + pressure * (1 - least)));
         q->pressure = (uint16_t)(pressure * UINT16_MAX);
         p->print_count += status == EBPO_OK;
@@ -460,7 +485,7 @@ static ebpo_status add_prints(haptic_paint *p, ebpo_error *error)
     stroke.layer = pen->layer;
     stroke.kind = pen->kind;
     stroke.colour = faded_colour(p);
-    stroke.radius = pen->radius;
+    stroke.radius = pen->radius / scale_of(p);
     stroke.time = p->prints_time;
     stroke.points = p->prints;
     stroke.point_count = p->print_count;
@@ -517,7 +542,7 @@ static double brush_motion(const haptic_paint *p, const haptic_sample *to)
 static void press_brush(haptic_paint *p, const haptic_sample *sample)
 {
     ebpo_paint_input next = input_of(p, sample);
-    double step = fmax(p->pen.pen.radius / 2, p->step_least);
+    double step = fmax(p->pen.pen.radius / 2, least_step(p));
     bool stays = p->pressed && next.pressure < p->print_pressure + 1.0 / LEVELS &&
                  brush_motion(p, sample) < step;
     if (sample->time < p->print_time + PRINT_MS || (stays && sample->depth < p->print.depth + step))
@@ -583,29 +608,73 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
     return taken;
 }
 
+/* Returns true if the step continues on the instance that was touched last. */
+static bool is_same(const haptic_paint *p, const haptic_sample *s)
+{
+    return !is_touching(s) || s->instance == p->instance || s->instance == UINT64_MAX;
+}
+
+/* Changes to the instance of a step, with a lifted pen. Returns false while the pen has hardly left
+ * the last one: where two instances meet, the pen would otherwise be lifted in each step. The
+ * caller has the lock. */
+static bool touch_instance(haptic_paint *p, const haptic_sample *s)
+{
+    if (is_same(p, s)) /* the pose of a first step may not be known */
+        return !p->pen.poses || p->instance != UINT64_MAX || !is_touching(s);
+    if (p->instance != UINT64_MAX && s->time - p->touched <= p->lost_ms)
+        return false;
+    lift_pen(p);
+    p->undone = false;
+    p->instance = s->instance;
+    p->pose = p->pen.poses ? &p->pen.poses[s->instance] : NULL;
+    return true;
+}
+
 void haptic_paint_take(void *user, const haptic_sample *samples, uint64_t count)
 {
     haptic_paint *p = user;
-    for (uint64_t i = 0; i < count;) {
+    for (uint64_t i = 0, same; i < count;) {
         lock_paint(p);
-        i += take_some(p, samples + i, count - i);
+        bool touches = touch_instance(p, &samples[i]);
+        for (same = 1; i + same < count && is_same(p, &samples[i + same]);)
+            same++;
+        i += touches ? take_some(p, samples + i, same) : 1;
         unlock_paint(p);
     }
 }
 
 /* --- commands --- */
 
+/* Returns the last contact of this run that has painted; NULL: none. The caller has the lock, and
+ * the pen is lifted. */
+static const haptic_contact *last_contact(haptic_paint *p)
+{
+    uint64_t count = info_of(p->drawn).stroke_count;
+    while (p->contact_count > 0 && p->contact[p->contact_count - 1].strokes == count)
+        p->contact_count--;
+    return p->contact_count > 0 ? &p->contact[p->contact_count - 1] : NULL;
+}
+
+double haptic_paint_last_contact(haptic_paint *p)
+{
+    lock_paint(p);
+    lift_pen(p);
+    const haptic_contact *last = last_contact(p);
+    double begin = last ? last->begin : -INFINITY;
+    unlock_paint(p);
+    return begin;
+}
+
 /* Removes the strokes of the last contact of this run that has painted. If the tool still touches,
- * it paints nothing until it was lifted. Returns false if there is
- * none. The caller has the lock. */
+ * it paints nothing until it was lifted. Returns false if there is none. The caller has the lock.
+ */
 static bool undo_contact(haptic_paint *p)
 {
-    uint64_t count = info_of(p->drawn).stroke_count, before = count;
-    while (p->contact_count > 0 && before == count)
-        before = p->contact[--p->contact_count];
-    if (before == count)
+    const haptic_contact *last = last_contact(p);
+    if (!last)
         return false;
-    bool removed = remove_strokes(p, before);
+    bool removed = remove_strokes(p, last->strokes);
+    p->contact_count--;
     p->finished = info_of(p->drawn).stroke_count;
     if (p->copied > p->finished)
         p->copied = p->finished;
@@ -786,6 +855,8 @@ void haptic_paint_write_news(haptic_paint *p, haptic_paint_cursor *at, FILE *out
         at->strokes != info.stroke_count || at->points != last.point_count) {
         fprintf(out, "event: paint\ndata: {\"count\":%llu,\"layer\":%llu,",
                 (unsigned long long)at->strokes, (unsigned long long)p->pen.pen.layer);
+        if (p->pen.name)
+            write_text(out, "model", p->pen.name);
         if (at->layer_changes != p->layer_changes || at->epoch != p->epoch)
             write_layers(p, out);
         write_strokes(p, at, out);
@@ -866,7 +937,7 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     pthread_mutex_init(&p->turn, NULL);
     pthread_mutex_init(&p->lock, NULL);
     p->pen = *pen;
-    p->step_least = SHORTEST_STEP * pen->diagonal;
+    p->instance = UINT64_MAX;
     p->lost_ms = fmax(LIFT_MS, 1500 / pen->rate);
     for (uint64_t i = 0; i < pen->point_count; i++)
         p->arm =

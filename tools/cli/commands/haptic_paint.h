@@ -10,19 +10,21 @@
 #include "cli/commands/haptic_live.h"
 
 /* The pen. Its pressure is that of the device's stylus or, without one, the force of the spring
- * divided by full_force, at most 1. */
+ * divided by full_force, at most 1. Its lengths are in the unit of the world. */
 typedef struct haptic_pen {
-    const char *path;    /* paint file; a new file gets a layer */
-    ebpo_paint_pen pen;  /* seed, time and progress are not used */
-    bool default_colour; /* pen.colour is that of the layer */
-    bool default_layer;  /* pen.layer is the topmost one */
-    bool dated;          /* strokes have the time at which they begin */
+    const char *path;       /* paint file; a new file gets a layer */
+    const char *name;       /* of the model in its scene; NULL: a single model */
+    const ebpo_pose *poses; /* [instances of the scene]; NULL: the model is not posed */
+    ebpo_paint_pen pen;     /* seed, time and progress are not used */
+    bool default_colour;    /* pen.colour is that of the layer */
+    bool default_layer;     /* pen.layer is the topmost one */
+    bool dated;             /* strokes have the time at which they begin */
     double stiffness, full_force;
     double fade; /* opacity at no pressure, as a share of that of the colour; 1: constant */
     const double (*points)[3]; /* [point_count] points of a brush */
     uint64_t point_count;      /* 0: not a brush; it paints at the contact */
     double skin;               /* distance that the proxy of a brush keeps from faces */
-    double diagonal;           /* of the model's box */
+    double diagonal;           /* of the model's box, in its unit */
     double rate;               /* steps per second */
 } haptic_pen;
 
@@ -57,6 +59,7 @@ typedef struct haptic_paint_cursor {
     }
 
 /* Writes events "paint" with the strokes and layers that a page does not have. Each has the members
+ *     model     the model's name in its scene; absent: a single model
  *     count     number of strokes that the page must keep; later ones were removed
  *     layers    [{ title, author, date, description, colour, opacity, visible }]; absent: unchanged
  *     layer     the layer that the pen paints on
@@ -68,6 +71,10 @@ void haptic_paint_write_news(haptic_paint *paint, haptic_paint_cursor *cursor, F
  * or removes the strokes of the last contact of this run: "undo". Returns false for other texts and
  * values. */
 bool haptic_paint_command(haptic_paint *paint, const char *text);
+
+/* Lifts the pen, and returns the time of the first step of the last contact of this run that has
+ * painted; -INFINITY: there is none. */
+double haptic_paint_last_contact(haptic_paint *paint);
 
 /* Saves the rest, and frees the object, which may be NULL. Returns the error of the last save or,
  * if points could not be painted, of painting. If the last save fails, the paint is saved to

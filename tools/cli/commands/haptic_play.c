@@ -118,6 +118,7 @@ static void step_ball(ebpo_haptic *haptic, const haptic_pose *pose, haptic_resul
     memcpy(a->touch, r.face == EBPO_NO_FACE ? r.proxy : r.point, sizeof r.point);
     a->depth = r.depth;
     a->face = r.face;
+    a->instance = r.instance;
     a->flags = r.flags;
 }
 
@@ -136,6 +137,7 @@ static void step_tool(const haptic_play *p, const haptic_pose *pose, haptic_resu
     memcpy(a->normal, r.normal, sizeof r.normal);
     a->depth = r.depth;
     a->face = r.face;
+    a->instance = r.instance;
     a->flags = r.flags;
 }
 
@@ -161,6 +163,7 @@ static void push_step(const haptic_play *p, uint64_t i, const haptic_pose *pose,
     haptic_sample sample = { .time = (double)i * 1000 / p->rate,
                              .depth = a->depth,
                              .clock = tool_clock(),
+                             .instance = a->face == EBPO_NO_FACE ? UINT64_MAX : a->instance,
                              .flags = a->flags,
                              .pressure = pose->pressure,
                              .lifted = pose->lifted };

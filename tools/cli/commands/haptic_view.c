@@ -97,7 +97,7 @@ static char *make_news(haptic_view *view, uint64_t *taken, haptic_paint_cursor *
         return NULL;
     write_step(view, taken, f); /* the page learns of a contact before its first paint */
     if (view->options.paint)
-        haptic_paint_write_news(view->options.paint, cursor, f);
+        haptic_paints_write_news(view->options.paint, cursor, f);
     if (fclose(f) == 0)
         return text;
     free(text);
@@ -116,7 +116,8 @@ static void lift_pen(haptic_view *view)
 static void stream_news(void *user, http_stream *stream)
 {
     haptic_view *view = user;
-    haptic_paint_cursor cursor = HAPTIC_PAINT_CURSOR_INIT;
+    haptic_paint_cursor *cursor =
+        view->options.paint ? haptic_paints_cursor(view->options.paint) : NULL;
     uint64_t taken = 0;
     int quiet = 0;
     char begin[200];
@@ -125,11 +126,11 @@ static void stream_news(void *user, http_stream *stream)
              "\"paint\":%s}\n\n",
              view->options.radius, view->options.full_depth,
              view->options.is_device ? "true" : "false", view->options.paint ? "true" : "false");
-    bool sent = http_stream_send(stream, begin, strlen(begin));
+    bool sent = (cursor || !view->options.paint) && http_stream_send(stream, begin, strlen(begin));
     atomic_fetch_add(&view->pages, 1);
     while (sent) {
         bool last = atomic_load(&view->ended);
-        char *news = make_news(view, &taken, &cursor);
+        char *news = make_news(view, &taken, cursor);
         size_t length = news ? strlen(news) : 0;
         if (length)
             sent = http_stream_send(stream, news, length);
@@ -141,6 +142,7 @@ static void stream_news(void *user, http_stream *stream)
         quiet = length || quiet == PING_TICKS ? 0 : quiet;
         tool_wait_until(tool_clock() + TICK_NS);
     }
+    free(cursor);
     if (sent)
         (void)http_stream_send(stream, "event: end\ndata: {}\n\n", 21);
     else if (!atomic_load(&view->ended))
@@ -187,7 +189,8 @@ static int take_message(void *user, const char *path, const char *bytes, size_t 
     if (strcmp(path, "/device") == 0 && view->options.is_device)
         return take_pose(view, text, length);
     if (strcmp(path, "/pen") == 0 && view->options.paint)
-        return haptic_paint_command(view->options.paint, text) ? HTTP_NO_CONTENT : HTTP_BAD_REQUEST;
+        return haptic_paints_command(view->options.paint, text) ? HTTP_NO_CONTENT
+                                                                : HTTP_BAD_REQUEST;
     return HTTP_NOT_FOUND;
 }
 
@@ -228,6 +231,18 @@ static void wait_for_page(haptic_view *view)
                 PAGE_SECONDS);
 }
 
+/* Adds the model, or the scene and its models. Returns false after an error, which was reported. */
+static bool add_models(site *s, const haptic_view_options *options)
+{
+    const haptic_scene *scene = options->scene;
+    bool ok = scene || site_add(s, options->model) == EXIT_OK;
+    for (uint64_t i = 0; scene && ok && i < scene->surface_count; i++)
+        ok = site_add(s, scene->paths[i]) == EXIT_OK;
+    if (ok && scene)
+        ok = site_show_scene(s, haptic_scene_text(scene)) == EXIT_OK;
+    return ok && site_finish(s) == EXIT_OK;
+}
+
 haptic_view *haptic_view_begin(const haptic_view_options *options)
 {
     haptic_view *view = calloc(1, sizeof *view);
@@ -244,8 +259,7 @@ haptic_view *haptic_view_begin(const haptic_view_options *options)
     pthread_mutex_init(&view->lock, NULL);
     pthread_mutex_init(&view->pose_lock, NULL);
     view->site = site_new(&of);
-    bool ok = view->site && site_add(view->site, options->model) == EXIT_OK &&
-              site_finish(view->site) == EXIT_OK && listen_at(view);
+    bool ok = view->site && add_models(view->site, options) && listen_at(view);
     if (ok && command_thread(&view->server, run_server, view) == 0) {
         wait_for_page(view);
         return view;

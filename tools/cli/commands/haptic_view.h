@@ -1,21 +1,22 @@
-/* Shows a haptic device in the web viewer while it moves: serves the viewer and the model on
+/* Shows a haptic device in the web viewer while it moves: serves the viewer and the models on
  * loopback, and sends steps and new paint to the page. The page can also be the device. */
 #ifndef EBPO_TOOLS_HAPTIC_VIEW_H
 #define EBPO_TOOLS_HAPTIC_VIEW_H
 
 #include "cli/commands/haptic_device.h"
 #include "cli/commands/haptic_live.h"
-#include "cli/commands/haptic_paint.h"
+#include "cli/commands/haptic_scene.h"
 
 typedef struct haptic_view_options {
-    const char *model;  /* path of the model */
-    const char *viewer; /* folder of the viewer; NULL: as installed */
+    const char *model;         /* path of the model; not used with a scene */
+    const haptic_scene *scene; /* NULL: a single model */
+    const char *viewer;        /* folder of the viewer; NULL: as installed */
     int64_t port, max_expansion;
-    haptic_paint *paint; /* NULL: nothing is painted */
-    double radius;       /* radius of the ball */
-    double full_depth;   /* depth of full pressure */
-    bool is_device;      /* the page is the device */
-    bool is_probe;       /* the tool is a probe, without contact */
+    haptic_paints *paint; /* NULL: nothing is painted */
+    double radius;        /* radius of the ball */
+    double full_depth;    /* depth of full pressure */
+    bool is_device;       /* the page is the device */
+    bool is_probe;        /* the tool is a probe, without contact */
 } haptic_view_options;
 
 typedef struct haptic_view haptic_view;

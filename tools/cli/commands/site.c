@@ -55,6 +55,7 @@ struct site {
     char *start; /* address of the first page, from "/" on */
     char *list;  /* of models, for the viewer */
     size_t list_bytes;
+    char *scene; /* text of the scene that the first page shows; NULL: no scene */
 };
 
 /* --- the table --- */
@@ -355,8 +356,8 @@ void site_print_models(const site *s, json *j, bool for_viewer)
     json_end(j);
 }
 
-/* Makes the address of the first page: of the only model, or of the list of models. A path in the
- * query is decoded once more than a path, so its % becomes %25. */
+/* Makes the address of the first page: of the scene, of the only model, or of the list of models. A
+ * path in the query is decoded once more than a path, so its % becomes %25. */
 static bool make_start(site *s)
 {
     const char *only = s->models == 1 ? s->model[0]->address : "";
@@ -365,6 +366,10 @@ static bool make_start(site *s)
     char *to = s->start = malloc(space);
     if (!to)
         return false;
+    if (s->scene) {
+        snprintf(to, space, "/?scene=scene.json%s", more);
+        return true;
+    }
     if (s->models != 1) {
         snprintf(to, space, "/?samples=models/index.json");
         return true;
@@ -373,6 +378,17 @@ static bool make_start(site *s)
         to += sprintf(to, *only == '%' ? "%%25" : "%c", *only);
     strcpy(to, more);
     return true;
+}
+
+int site_show_scene(site *s, char *text)
+{
+    const http_content content = { .type = "application/json",
+                                   .bytes = text,
+                                   .size = text ? strlen(text) : 0 };
+    s->scene = text;
+    return text && add_entry(s, strdup("/scene.json"), NULL, &content, NULL)
+               ? EXIT_OK
+               : command_no_memory(s->options.command);
 }
 
 /* Adds the list of models, and sets the address of the first page. */
@@ -475,6 +491,7 @@ void site_free(site *s)
     free(s->entry);
     free(s->model);
     free(s->list);
+    free(s->scene);
     free(s->start);
     free(s);
 }

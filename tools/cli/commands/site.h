@@ -22,6 +22,11 @@ site *site_new(const site_options *options);
 /* Adds a model, or all models below a folder. Returns an exit code; errors are reported. */
 int site_add(site *s, const char *path);
 
+/* Makes the first page that of a scene, whose models are those of the site. text: of the scene
+ * file, with the addresses models/NUMBER/FILE of models. Takes ownership of `text`. Returns an exit
+ * code. */
+int site_show_scene(site *s, char *text);
+
 /* Completes the site after the last model: adds the list of models, and selects the first page.
  * Returns an exit code. */
 int site_finish(site *s);

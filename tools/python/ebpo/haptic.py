@@ -11,6 +11,7 @@ from . import _declared as c
 from ._checked import doubles
 from ._library import Handle, call, lib, made
 from .forks import renew_after_fork
+from .scene import Scene
 from .signatures import ArrayLike, Doubles
 
 if TYPE_CHECKING:
@@ -20,7 +21,10 @@ _STOPPED = c.EBPO_HAPTIC_STOPPED
 
 
 class HapticResult(NamedTuple):
-    """Result of a haptic step of a ball or a tool; see ebpo/haptic.h. face: -1: no face is near."""
+    """Result of a haptic step of a ball or a tool; see ebpo/haptic.h.
+
+    face: -1: no face is near. instance: index of the instance of a scene that has the face, otherwise 0.
+    """
 
     proxy: Doubles
     force: Doubles
@@ -30,6 +34,7 @@ class HapticResult(NamedTuple):
     depth: float
     face: int
     flags: int
+    instance: int
 
     @property
     def stopped(self) -> bool:
@@ -40,7 +45,7 @@ class HapticResult(NamedTuple):
 class ProbeResult(NamedTuple):
     """Result of a haptic step of a probe.
 
-    distance: NaN if only its bounds are known. lo, hi: guaranteed bounds of the distance.
+    distance: NaN if only its bounds are known. lo, hi: guaranteed bounds of the distance. instance: as in HapticResult.
     """
 
     distance: float
@@ -50,6 +55,7 @@ class ProbeResult(NamedTuple):
     face: int
     where: int
     flags: int
+    instance: int
 
     @property
     def stopped(self) -> bool:
@@ -69,10 +75,11 @@ def _number(face: int) -> int:
 
 
 class Haptic:
-    """A haptic object at `position`. One thread at a time.
+    """A haptic object at `position`, for a model or all instances of a scene. One thread at a time.
 
     The object is a ball of `radius`; with `points` (n, 3) a tool; with `probe` a probe, which faces do not
-    stop. ebpo_haptic_options in ebpo/haptic.h describes the other arguments.
+    stop. time: time of a scene in seconds, whose poses do not change afterwards; None: its first time.
+    ebpo_haptic_options in ebpo/haptic.h describes the other arguments.
 
     A separate thread loads faces. While a result has EBPO_HAPTIC_WAITING (2) in `flags`, the proxy waits
     for faces. If a result is `stopped`, no further faces will be loaded.
@@ -85,9 +92,9 @@ class Haptic:
     (True, False)
     """
 
-    def __init__(self, model: Model, position: ArrayLike, *, radius: float = 0.0, points: ArrayLike | None = None,
-                 probe: bool = False, skin: float = 0.0, search_radius: float = 0.0, stiffness: float = 400.0,
-                 damping: float = 0.4, friction: float = 0.0, step_seconds: float = 0.001,
+    def __init__(self, model: Model | Scene, position: ArrayLike, *, time: float | None = None, radius: float = 0.0,
+                 points: ArrayLike | None = None, probe: bool = False, skin: float = 0.0, search_radius: float = 0.0,
+                 stiffness: float = 400.0, damping: float = 0.4, friction: float = 0.0, step_seconds: float = 0.001,
                  faces: int = 16384) -> None:
         self._process = os.getpid()
         wanted = made(c.ebpo_haptic_options, radius=radius, skin=skin, search_radius=search_radius, stiffness=stiffness,
@@ -99,8 +106,15 @@ class Haptic:
             wanted.points, wanted.point_count, wanted.kind = rows.ctypes.data, len(rows), 2
         elif probe:
             wanted.kind = 1
-        self._made = Handle.made("ebpo_haptic_new", model.model, ctypes.byref(wanted), _vector(position, 3),
-                                 free="ebpo_haptic_free", keep=(model.model,))
+        rest = ctypes.byref(wanted), _vector(position, 3)
+        if isinstance(model, Scene):
+            handle, instances = model._posed(c.ebpo_haptic_instance, time)
+            self._made = Handle.made("ebpo_haptic_new_posed", instances, len(instances), *rest, free="ebpo_haptic_free",
+                                     keep=(handle,))
+        elif time is not None:
+            raise ValueError("time belongs to a scene; a model has none")
+        else:
+            self._made = Handle.made("ebpo_haptic_new", model.model, *rest, free="ebpo_haptic_free", keep=(model.model,))
         renew_after_fork(self)
 
     def _renew(self) -> None:
@@ -117,20 +131,20 @@ class Haptic:
         r = c.ebpo_haptic_ball_result()
         lib.ebpo_haptic_step_ball(self._handle, _vector(device, 3), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.zeros(3), np.array([0, 0, 0, 1.0]),
-                            np.array(r.normal), r.depth, _number(r.face), r.flags)
+                            np.array(r.normal), r.depth, _number(r.face), r.flags, r.instance)
 
     def step_tool(self, position: ArrayLike, quaternion: ArrayLike) -> HapticResult:
         """Compute a haptic step of a tool at a pose. quaternion: x, y, z, w."""
         r = c.ebpo_haptic_tool_result()
         lib.ebpo_haptic_step_tool(self._handle, _vector(position, 3), _vector(quaternion, 4), ctypes.byref(r))
         return HapticResult(np.array(r.proxy), np.array(r.force), np.array(r.torque), np.array(r.turn),
-                            np.array(r.normal), r.depth, _number(r.face), r.flags)
+                            np.array(r.normal), r.depth, _number(r.face), r.flags, r.instance)
 
     def step_probe(self, position: ArrayLike) -> ProbeResult:
         """Compute a haptic step of a probe at a position (3,)."""
         r = c.ebpo_haptic_probe_result()
         lib.ebpo_haptic_step_probe(self._handle, _vector(position, 3), ctypes.byref(r))
-        return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags)
+        return ProbeResult(r.distance, r.lo, r.hi, np.array(r.normal), _number(r.face), r.where, r.flags, r.instance)
 
     def reset(self, position: ArrayLike) -> None:
         """Move the device and the proxy to another position, without contact."""

@@ -97,6 +97,19 @@ class Scene:
             call("ebpo_scene_pose", self._handle, self._number(instance), time, ctypes.byref(out))
         return matrix_of(out)
 
+    def _posed(self, kind: Any, time: float | None) -> tuple[Handle, Any]:
+        """Return the handle, and an array of structs `kind` with the model and the pose of each instance."""
+        posed, model = (kind * len(self.instances))(), ctypes.c_void_p()
+        with self._lock:
+            handle = self._handle
+            for number, one in enumerate(posed):
+                facts = made(c.ebpo_scene_instance)
+                lib.ebpo_scene_get_instance(handle, number, ctypes.byref(facts))
+                call("ebpo_scene_model", handle, facts.model, ctypes.byref(model))
+                call("ebpo_scene_pose", handle, number, self.begin if time is None else time, ctypes.byref(one.pose))
+                one.model = model.value
+        return handle, posed
+
     def box(self, begin: float | None = None, end: float | None = None) -> Doubles:
         """Return a box (2, 3) that contains all instances from time begin to time end. Default: all times."""
         out = np.empty((2, 3))

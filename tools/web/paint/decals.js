@@ -62,6 +62,24 @@ const BLENDING = { custom: 5, none: 0, add: 100, zero: 200, one: 201, withoutAlp
 const FRONT = 0, BACK = 1, DOUBLE = 2;
 const NEAR_PIXELS = 2; // for real faces; for envelopes the value is near the size of cells
 
+const CHUNK = 1000; // points of a stroke that are put into the picture together
+
+/**
+ * Returns decals of a stroke: the same objects as before for points that have not changed. Overlapping points of a translucent stroke cover only once, so it is one
+ * decal. `made`: a WeakMap of earlier decals; isKnown(point): its faces are known; `about`: what else decals depend on; decal(stroke, points): makes a decal.
+ */
+export function splitStroke(s, made, { isKnown, about, decal }) {
+  const size = s.erases || s.colour[3] === 255 ? CHUNK : s.points.length, all = [];
+  for (let i = 0; i < s.points.length; i += size) {
+    const points = s.points.slice(i, i + size), known = points.reduce((sum, p) => sum + isKnown(p), 0), last = points.at(-1), before = made.get(points[0]);
+    const what = [points.length, known, s.erases, s.radius, about, ...s.colour].join();
+    const now = before?.what === what && before.last === last ? before : { what, last, decal: decal(s, points) };
+    made.set(points[0], now);
+    all.push(now.decal);
+  }
+  return all;
+}
+
 export class Decals {
   constructor(kit) {
     this.kit = kit;

@@ -24,6 +24,17 @@ export function misfit(doc, info) {
   return undefined;
 }
 
+/** Adds the points of an event "paint" of `ebpo haptic --view` to strokes. Returns { strokes, fresh }: all strokes, and the new points as strokes. */
+export function received(before, { count, strokes: parts }) {
+  const strokes = before.slice(0, count), fresh = [];
+  for (const { number, points, ...stroke } of parts) {
+    const added = points.map(([face, a, b, x, y, z, size, pressure, time]) => ({ face, weights: [a, b], place: [x, y, z], size, pressure, time }));
+    fresh.push({ ...stroke, points: added });
+    strokes[number] = { ...stroke, points: [...(strokes[number]?.points ?? []), ...added] };
+  }
+  return { strokes, fresh };
+}
+
 export const today = () => new Date().toISOString().replace(/\.\d+Z$/, 'Z');
 
 export class PaintDocument {

@@ -1,33 +1,23 @@
 // The pen: paints and erases with mouse, finger or stylus; layers; undo; save and open.
 import { complain, make, modelName, positionsOf, reachOf, save, section, take, taken } from '../parts.js';
 import { kit } from '../scene.js';
-import { $, emit, length, on, state, toModel, toScene } from '../state.js';
-import { Decals } from './decals.js';
-import { PaintDocument, identityOf, misfit } from './document.js';
+import { $, emit, on, state, toModel, toScene } from '../state.js';
+import { Decals, splitStroke } from './decals.js';
+import { PaintDocument, identityOf, misfit, received } from './document.js';
 import { MOST, cleanText, readPaint, writePaint } from './paint_file.js';
+import { ROWS, linkRows, radius, sendCommands, showRadius } from './pen_buttons.js';
 import { Stroke } from './stroke.js';
 
-const SWATCHES = ['#d9483b', '#f08c2e', '#f2cf3b', '#4cae50', '#2e86de', '#7d4fc4', '#ffffff', '#1c1c1c'];
-const HTML = `
-  <div class="row"><div class="buttons"><button id="penOn" class="small" aria-pressed="false" title="Pen (B)">Pen</button>
-    <button id="eraserOn" class="small" aria-pressed="false" title="Eraser (R)">Eraser</button></div>
-    <div class="buttons"><button id="penUndo" class="small" title="Undo (Ctrl Z)">Undo</button><button id="penRedo" class="small" title="Redo (Ctrl Shift Z)">Redo</button></div></div>
-  <p class="hint" id="penHint"></p>
-  <div class="swatches" role="group" aria-label="Colour of the pen">
-    ${SWATCHES.map((c) => `<button data-colour="${c}" style="background:${c}" aria-label="${c}"></button>`).join('')}
-    <input type="color" id="penColour" value="${SWATCHES[0]}" aria-label="Another colour"></div>
-  <div class="row"><label for="penSize">Radius</label><input type="range" id="penSize" min="0" max="100" value="55"><output id="penSizeText"></output></div>
+const HTML = `${ROWS}
   <ul id="layers" class="list"></ul>
   <div class="buttons"><button id="layerAdd" class="small">Add a layer</button><button id="paintOpen" class="small">Open …</button><button id="paintSave" class="small">Save</button></div>
   <input type="file" id="paintFile" accept=".h5" hidden>`;
-const NARROW = 2e-4, WIDE = 0.1;    // radii of the pen, in halves of the box's diagonal
-const FULL_SIZE = 32768, AT_ONCE = 200, CHUNK = 1000; // CHUNK: points of a stroke that are put into the picture together
+const FULL_SIZE = 32768, AT_ONCE = 200;
 
 export function addPen({ scene, worker, query }, pipeline) {
   const decals = pipeline.layers = new Decals(kit), docs = new Map(), reaches = new WeakMap(); // documents by a model's digest; { normal, faces } by a point of a document
   let doc, layer = 0, stroke, pending = 0, unsettled = 0, details, requested = 0, command; // command(text): sends a command to a device that paints, see live.js
   const colour = () => [1, 3, 5].map((i) => parseInt($('penColour').value.slice(i, i + 2), 16));
-  const radius = () => NARROW * (WIDE / NARROW) ** ($('penSize').value / 100) / state.scene.scale;
   const positionsOfPoints = (points) => {
     if (!state.info.parts.has('mesh'))
       throw new Error('the file has no faces to paint on; convert the model with its mesh');
@@ -46,19 +36,7 @@ export function addPen({ scene, worker, query }, pipeline) {
   const decal = (s, points) => ({ erases: s.erases, colour: s.colour, radius: s.radius * state.scene.scale,
     points: points.map((p) => ({ centre: toScene(p.place), normal: reaches.get(p)?.normal ?? p.normal, faces: reaches.get(p)?.faces, share: p.size / FULL_SIZE })) });
 
-  // Returns decals of a stroke: the same objects as before for points that have not changed. Overlapping points of a translucent stroke cover only once, so it is one decal.
-  const made = new WeakMap(); // { what, last, decal } by the first point of a decal
-  function decalsOf(s) {
-    const size = s.erases || s.colour[3] === 255 ? CHUNK : s.points.length, all = [];
-    for (let i = 0; i < s.points.length; i += size) {
-      const points = s.points.slice(i, i + size), known = points.reduce((sum, p) => sum + reaches.has(p), 0), last = points.at(-1), before = made.get(points[0]);
-      const what = [points.length, known, s.erases, s.radius, state.scene.scale, ...s.colour].join();
-      const now = before?.what === what && before.last === last ? before : { what, last, decal: decal(s, points) };
-      made.set(points[0], now);
-      all.push(now.decal);
-    }
-    return all;
-  }
+  const made = new WeakMap(), decalsOf = (s) => splitStroke(s, made, { isKnown: (p) => reaches.has(p), about: state.scene.scale, decal });
   const inPicture = (faces) => faces && Float32Array.from({ length: faces.length }, (_, i) => (faces[i] - state.scene.center[i % 3]) * state.scene.scale);
   // Real faces are drawn at their exact positions, envelopes within one cell of them.
   decals.near = () => (state.stats?.meshTriangles === state.stats?.triangles ? 0 : 2 * (Number($('detail').value) || state.auto || 0));
@@ -198,12 +176,7 @@ export function addPen({ scene, worker, query }, pipeline) {
 
   // Takes new layers and points of a device: an event "paint" of `ebpo haptic --view`.
   async function receive({ count, layer: at, layers, strokes: parts }) {
-    const strokes = doc.state.strokes.slice(0, count), { opening } = state, { length: before } = doc.state.strokes, fresh = [];
-    for (const { number, points, ...stroke } of parts) {
-      const added = points.map(([face, a, b, x, y, z, size, pressure, time]) => ({ face, weights: [a, b], place: [x, y, z], size, pressure, time }));
-      fresh.push({ ...stroke, points: added });
-      strokes[number] = { ...stroke, points: [...(strokes[number]?.points ?? []), ...added] };
-    }
+    const { opening } = state, { length: before } = doc.state.strokes, { strokes, fresh } = received(doc.state.strokes, { count, strokes: parts });
     doc.state = doc.saved = { ...doc.state, layers: layers ?? doc.state.layers, strokes };
     if (layers || at !== layer || strokes.length !== before) {
       layer = at;
@@ -229,20 +202,8 @@ export function addPen({ scene, worker, query }, pipeline) {
   function beginLive(send) {
     command = send;
     details.open = true;
-    $('penUndo').disabled = false;
-    for (const id of ['penRedo', 'paintOpen'])
-      $(id).hidden = true;
-    const colourChanged = () => command(`colour ${$('penColour').value.slice(1)}`);
-    $('penColour').onchange = colourChanged;
-    details.querySelectorAll('[data-colour]').forEach((b) => b.addEventListener('click', colourChanged));
-    $('penSize').onchange = () => command(`radius ${radius()}`);
-    $('layerAdd').onclick = () => command(`new-layer Layer ${doc.state.layers.length + 1}`);
-    for (const [id, text] of [['penOn', 'paint'], ['eraserOn', 'erase']])
-      $(id).onclick = () => {
-        command(text);
-        $('penOn').ariaPressed = String(id === 'penOn');
-        $('eraserOn').ariaPressed = String(id === 'eraserOn');
-      };
+    $('paintOpen').hidden = true;
+    sendCommands(details, command, () => doc.state.layers.length);
   }
 
   // --- files ---
@@ -310,7 +271,7 @@ export function addPen({ scene, worker, query }, pipeline) {
     stroke = undefined;
     changed();
     if (state.info)
-      $('penSizeText').textContent = length(radius(), 2);
+      showRadius();
   }
 
   async function fromAddress() {
@@ -342,8 +303,7 @@ export function addPen({ scene, worker, query }, pipeline) {
       };
     $('penUndo').onclick = undo;
     $('penRedo').onclick = redo;
-    details.querySelectorAll('[data-colour]').forEach((b) => (b.onclick = () => ($('penColour').value = b.dataset.colour)));
-    $('penSize').oninput = () => ($('penSizeText').textContent = length(radius(), 2));
+    linkRows(details);
     $('layerAdd').onclick = () => {
       doc.addLayer({ author: localStorage.getItem('ebpo:author') ?? '' });
       layer = doc.state.layers.length - 1;

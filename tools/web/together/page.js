@@ -1,9 +1,11 @@
-// The page with several models or a scene: instances, poses, colours, time and clicks. Levels, paint and notes of single models are not supported here.
+// The page with several models or a scene: instances, poses, colours, time and clicks. Levels, notes, and a pen of this page are not supported here.
 import { Assembly, COLOURS } from './assembly.js';
 import { Contacts } from './contacts.js';
+import { addPainted } from './painted.js';
 import { boxText, cameraOf, cameraText, boxOf, pointsOf, pointsText, withQuery } from '../address.js';
 import { addCompass } from '../compass.js';
 import { busy, bytes, showError, showLine, showPointCard } from '../line.js';
+import { addLive } from '../live.js';
 import { addDistances } from '../measure.js';
 import { complain, make, markOn, section } from '../parts.js';
 import { Pipeline } from '../pipeline.js';
@@ -116,7 +118,8 @@ class Together {
     addDistances({ scene, placeOf: (point) => this.#placeOf(point), changed: () => this.changed() });
     if (assembly.instances.length > 1)
       this.contacts = new Contacts({ assembly, scene, lookAt: (instance) => this.#lookAt(instance) });
-    addShading(scene, scene.pipeline = new Pipeline(kit), () => this.changed());
+    const pipeline = scene.pipeline = new Pipeline(kit);
+    addShading(scene, pipeline, () => this.changed());
     addSharing({ address: () => this.address(), elementOf: (query) => this.#elementOf(query) });
     addCompass({ scene, changed: () => this.changed(), up: assembly.up });
     this.#rows();
@@ -134,6 +137,8 @@ class Together {
     page.layout();
     scene.home();
     this.homeView = cameraText(scene.place);
+    if (this.query.has('live'))
+      addLive({ scene, query: this.query }, this.painted = addPainted({ scene, assembly, pipeline }));
   }
 
   #rows() {
@@ -337,6 +342,7 @@ class Together {
       this.timer = undefined;
       if (!state.info)
         return;
+      this.painted?.draw();
       const detail = $('detail').value === 'auto' ? PIXELS : Number($('detail').value);
       this.assembly.update(this.scene.camera, this.scene.canvas.clientHeight, { pixels: detail, triangles: TRIANGLES_MOST, mesh: true });
       this.scene.redraw();
