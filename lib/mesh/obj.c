@@ -354,6 +354,17 @@ static bool step_to_statement(obj_reading *r, ebpo_obj_word *word)
     return more;
 }
 
+/* Returns true for statements whose rest is a name (ebpo_obj_name). Both passes must read these
+ * statements in the same way, because a backslash at the end of a name joins no lines. */
+static bool has_name(ebpo_obj_word word)
+{
+    static const char *const words[] = { "g", "o", "usemtl", "mtllib", "s" };
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
 /* --- the second pass: faces, and their materials and groups --- */
 
 /* Tables of the second and third index of a corner, v/vt/vn. */
@@ -679,6 +690,8 @@ static ebpo_status read_values(obj_reading *r)
     ebpo_obj_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && step_to_statement(r, &word)) {
+        if (has_name(word))
+            (void)ebpo_obj_name(&r->text);
         if (*word.s != 'v' || word.n > 2)
             continue;
         if (word.n == 1)

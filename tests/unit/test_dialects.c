@@ -121,6 +121,10 @@ static const dialect dialects[] = {
     { "names.obj",
       FILE_OF("mtllib gone.mtl \xc3\xa9.mtl\ng \xe4\xb8\x89\xe8\xa7\x92 \\\no \nusemtl\n" V4 F4), 4,
       4, NULL },
+    { "name_ends.obj",
+      FILE_OF("g a\\\nv 9 9 9\no b\\\nusemtl c\\\nv 0 0 0\nmtllib d\\\nv 1 0 0\n"
+              "s e\\\nv 0 1 0\nv 0 0 1\nf 2 4 3\nf 2 3 5\nf 2 5 4\nf 3 4 5\n"),
+      4, 4, NULL },
     { "one_line_more.obj", FILE_OF("s off\ns 1\ng a b c\n" V4 "l 1 2\np 1 2 3\n" F4), 4, 4,
       "points, lines, curves and surfaces, which are not faces: 2" },
     { "curves.obj", FILE_OF(V4 "vp 1 2\ncstype bezier\ndeg 3\ncurv 0 1 1 2 3 4\nend\n"), 0, 0,
