@@ -7,6 +7,7 @@
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -612,7 +613,7 @@ static ebpo_status fail_number(const obj_reading *r, ebpo_obj_word word)
 static ebpo_status divide_by_weight(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
 {
     double w;
-    if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0)
+    if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0 || !isfinite(w))
         return fail_number(r, word[3]);
     for (int k = 0; k < 3 && w != 1; k++)
         ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
