@@ -126,6 +126,8 @@ typedef struct ebpo_ply_parser {
     bool *lost; /* [attribute arrays] true if a value does not fit its type; NULL: attributes are
                  * not read */
     uint64_t faces_reserved; /* rows reserved for face attributes */
+    uint64_t
+        repeated_bytes; /* bytes of lists that were copied to the other triangles of polygons */
     ebpo_error *error;
 } ebpo_ply_parser;
 

@@ -1,5 +1,6 @@
 /* Tests data of a PLY file besides positions and corners: it is read in each encoding; kept by
  * building, writing and reading; split and merged with the mesh; and written unchanged. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 
 #include "mesh/attributes.h"
 #include "check_main.h"
+#include "core/text.h"
 #include "format/read_attributes.h"
 #include "format/chunks.h"
 #include "format/pick_rows.h"
@@ -498,6 +500,41 @@ START_TEST(test_attributes_of_triangles_follow_polygon)
 }
 END_TEST
 
+/* A list of as many items as its polygon has corners would be copied to each of the polygon's
+ * triangles. The other attributes stay. */
+START_TEST(test_attributes_copies_of_lists_are_limited)
+{
+    enum { CORNERS = 36000 };
+    ebpo_text_stream text;
+    ck_assert(ebpo_text_stream_begin(&text));
+    fprintf(text.file,
+            "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 2\nproperty list int int vertex_indices\n"
+            "property list int uchar words\nproperty uchar label\nend_header\n",
+            CORNERS);
+    for (int i = 0; i < CORNERS; i++)
+        fprintf(text.file, "%.9g %.9g 0\n", cos(2 * M_PI * i / CORNERS),
+                sin(2 * M_PI * i / CORNERS));
+    fprintf(text.file, "%d", CORNERS);
+    for (int i = 0; i < CORNERS; i++)
+        fprintf(text.file, " %d", i);
+    fprintf(text.file, " %d", CORNERS);
+    for (int i = 0; i < CORNERS; i++)
+        fputs(" 1", text.file);
+    fputs(" 7\n4 0 2 1 9 1 5 8\n", text.file);
+    ck_assert(ebpo_text_stream_end(&text));
+    ebpo_mesh mesh = parse((const uint8_t *)text.text, text.bytes);
+    free(text.text);
+    ck_assert_uint_eq(mesh.face_count, CORNERS);
+    const char *lost = ebpo_mesh_attributes_lost(&mesh);
+    ck_assert(lost && strstr(lost, "property 'words' of 'face' (copies"));
+    ck_assert_uint_eq(mesh.attributes->count, 1);
+    const ebpo_attribute *label = &mesh.attributes->array[0];
+    ck_assert(label->values[CORNERS - 3] == 7 && label->values[CORNERS - 2] == 8);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 static const char strip_vertices[] =
     "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
     "property float z\n";
@@ -637,6 +674,7 @@ TEST_SUITE(mesh_attributes)
     tcase_add_test(tests, test_attributes_pick_of_no_rows);
     tcase_add_test(tests, test_attributes_of_joined_vertices_keep_first);
     tcase_add_test(tests, test_attributes_of_triangles_follow_polygon);
+    tcase_add_test(tests, test_attributes_copies_of_lists_are_limited);
     tcase_add_test(tests, test_attributes_of_strips_are_empty);
     tcase_add_test(tests, test_attributes_ply_writes_every_property);
     tcase_add_test(tests, test_attributes_report_lost_properties);
