@@ -590,6 +590,31 @@ START_TEST(test_attributes_ply_writes_every_property)
 }
 END_TEST
 
+/* Types have two names. A mesh without other data is also written with the names of its source. */
+START_TEST(test_attributes_ply_keeps_names_of_types)
+{
+    static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n"
+                               "property float32 x\nproperty float32 y\nproperty float32 z\n"
+                               "element face 1\nproperty list uint8 int32 vertex_indices\n"
+                               "end_header\n";
+    enum { HEAD = sizeof head - 1, BODY = 36 + 13 };
+    uint8_t data[HEAD + BODY] = { 0 }, written[HEAD + BODY + 1];
+    memcpy(data, head, HEAD);
+    data[HEAD + 15] = 0x3f; /* the second vertex has x = 0.5, the third has y = 0.5 */
+    data[HEAD + 31] = 0x3f;
+    data[HEAD + 36] = 3;
+    data[HEAD + 41] = 1;
+    data[HEAD + 45] = 2;
+    ebpo_mesh mesh = parse(data, sizeof data);
+    fine(ebpo_mesh_write_ply(&mesh, scratch("a.ply"), &error));
+    FILE *f = fopen(scratch("a.ply"), "rb");
+    ck_assert_uint_eq(fread(written, 1, sizeof written, f), sizeof data);
+    fclose(f);
+    ck_assert_mem_eq(written, data, sizeof data);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 START_TEST(test_attributes_report_lost_properties)
 {
     ebpo_mesh mesh =
@@ -677,6 +702,7 @@ TEST_SUITE(mesh_attributes)
     tcase_add_test(tests, test_attributes_copies_of_lists_are_limited);
     tcase_add_test(tests, test_attributes_of_strips_are_empty);
     tcase_add_test(tests, test_attributes_ply_writes_every_property);
+    tcase_add_test(tests, test_attributes_ply_keeps_names_of_types);
     tcase_add_test(tests, test_attributes_report_lost_properties);
     tcase_add_test(tests, test_attributes_of_elements_with_equal_name);
     tcase_add_test(tests, test_attributes_are_listed_by_file);
