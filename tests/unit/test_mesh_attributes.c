@@ -590,13 +590,14 @@ START_TEST(test_attributes_ply_writes_every_property)
 }
 END_TEST
 
-/* Types have two names. A mesh without other data is also written with the names of its source. */
-START_TEST(test_attributes_ply_keeps_names_of_types)
+/* Types have two names. A mesh without other data is also written with the names of its source, and
+ * with elements that have no properties. */
+START_TEST(test_attributes_ply_keeps_source_header)
 {
     static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n"
                                "property float32 x\nproperty float32 y\nproperty float32 z\n"
                                "element face 1\nproperty list uint8 int32 vertex_indices\n"
-                               "end_header\n";
+                               "element mark 2\nend_header\n";
     enum { HEAD = sizeof head - 1, BODY = 36 + 13 };
     uint8_t data[HEAD + BODY] = { 0 }, written[HEAD + BODY + 1];
     memcpy(data, head, HEAD);
@@ -702,7 +703,7 @@ TEST_SUITE(mesh_attributes)
     tcase_add_test(tests, test_attributes_copies_of_lists_are_limited);
     tcase_add_test(tests, test_attributes_of_strips_are_empty);
     tcase_add_test(tests, test_attributes_ply_writes_every_property);
-    tcase_add_test(tests, test_attributes_ply_keeps_names_of_types);
+    tcase_add_test(tests, test_attributes_ply_keeps_source_header);
     tcase_add_test(tests, test_attributes_report_lost_properties);
     tcase_add_test(tests, test_attributes_of_elements_with_equal_name);
     tcase_add_test(tests, test_attributes_are_listed_by_file);
