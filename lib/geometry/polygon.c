@@ -212,10 +212,50 @@ static bool cut_least_ears(const ebpo_chain *chain, uint32_t (*triangles)[3])
     return ok;
 }
 
-bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
+static bool cut_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
 {
     return chain->n <= chain->optimal ? least_area(chain, triangles)
                                       : cut_least_ears(chain, triangles);
+}
+
+/* Returns half of the difference between a point and the first point. The half cannot overflow. */
+static double half_from_first(const ebpo_chain *c, uint64_t i, int k)
+{
+    return 0.5 * c->point[i][k] - 0.5 * c->point[0][k];
+}
+
+/* Returns a power of two that prevents squares of areas from overflow and underflow; 1 for most
+ * chains. */
+static double scale_of_chain(const ebpo_chain *c)
+{
+    enum { FAR = 200 };
+    double most = 0;
+    int exponent;
+    EBPO_FOR_ITEMS(c->workspace, i, 0, c->n)
+        for (int k = 0; k < 3; k++)
+            most = fmax(most, fabs(half_from_first(c, i, k)));
+    if (!isfinite(most))
+        return 1;
+    frexp(most, &exponent);
+    return exponent > FAR || exponent < -FAR ? ldexp(1, exponent < -1000 ? 1000 : -exponent) : 1;
+}
+
+bool ebpo_triangulate_chain(const ebpo_chain *chain, uint32_t (*triangles)[3])
+{
+    double scale = scale_of_chain(chain);
+    if (scale == 1)
+        return cut_chain(chain, triangles);
+    ebpo_chain scaled = *chain;
+    double(*point)[3] = ebpo_array_alloc(chain->workspace, chain->n, sizeof *point);
+    if (!point)
+        return false;
+    EBPO_FOR_ITEMS(chain->workspace, i, 0, chain->n)
+        for (int k = 0; k < 3; k++)
+            point[i][k] = scale * half_from_first(chain, i, k);
+    scaled.point = (const double(*)[3])point;
+    bool done = cut_chain(&scaled, triangles);
+    ebpo_array_free(chain->workspace, point);
+    return done;
 }
 
 /* ==== outlines in the plane, ear by ear ==== */

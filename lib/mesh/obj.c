@@ -7,6 +7,7 @@
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -354,6 +355,17 @@ static bool step_to_statement(obj_reading *r, ebpo_obj_word *word)
     return more;
 }
 
+/* Returns true for statements whose rest is a name (ebpo_obj_name). Both passes must read these
+ * statements in the same way, because a backslash at the end of a name joins no lines. */
+static bool has_name(ebpo_obj_word word)
+{
+    static const char *const words[] = { "g", "o", "usemtl", "mtllib", "s" };
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (ebpo_obj_word_is(word, words[i]))
+            return true;
+    return false;
+}
+
 /* --- the second pass: faces, and their materials and groups --- */
 
 /* Tables of the second and third index of a corner, v/vt/vn. */
@@ -601,7 +613,7 @@ static ebpo_status fail_number(const obj_reading *r, ebpo_obj_word word)
 static ebpo_status divide_by_weight(obj_reading *r, const ebpo_obj_word word[4], double xyz[3])
 {
     double w;
-    if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0)
+    if (!ebpo_number_double(&w, word[3].s, word[3].n, r->build->c_locale) || w == 0 || !isfinite(w))
         return fail_number(r, word[3]);
     for (int k = 0; k < 3 && w != 1; k++)
         ebpo_import_quotient(r->build, &xyz[k], word[k].s, word[k].n, w);
@@ -679,6 +691,8 @@ static ebpo_status read_values(obj_reading *r)
     ebpo_obj_word word;
     ebpo_status status = EBPO_OK;
     while (status == EBPO_OK && step_to_statement(r, &word)) {
+        if (has_name(word))
+            (void)ebpo_obj_name(&r->text);
         if (*word.s != 'v' || word.n > 2)
             continue;
         if (word.n == 1)

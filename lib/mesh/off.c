@@ -4,6 +4,7 @@
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -390,8 +391,9 @@ static ebpo_status read_vertex(off_reading *r, uint64_t row)
         }
         const char *s = word[k].s;
         size_t n = word[k].n;
-        bool good = k < 3 ? ebpo_import_coordinate(r->build, &xyz[k], s, n)
-                          : ebpo_number_double(&w, s, n, r->build->c_locale) && w != 0;
+        bool good = k < 3
+                        ? ebpo_import_coordinate(r->build, &xyz[k], s, n)
+                        : ebpo_number_double(&w, s, n, r->build->c_locale) && w != 0 && isfinite(w);
         if (!good)
             return fail_number(r, word[k], row);
     }

@@ -270,11 +270,30 @@ static void repeat_columns(const ebpo_attribute *a, uint64_t row, uint64_t end)
         memcpy(a->values + i * bytes, a->values + row * bytes, bytes);
 }
 
-static ebpo_status repeat_list(ebpo_ply_parser *p, ebpo_attribute *a, uint64_t row, uint64_t end)
+/* Copies of lists take at most REPEATED_LEAST bytes, plus REPEATED_FACTOR times the size of the
+ * file. Without this limit, a polygon of n corners with a list of n items could make n * n items of
+ * a small file. */
+#define REPEATED_LEAST  (UINT64_C(1) << 30)
+#define REPEATED_FACTOR 64
+
+/* Copies the list of a row to the rows from row + 1 to end - 1. If the copies exceed the limit, the
+ * mesh will not have this attribute, which is recorded. */
+static ebpo_status repeat_list(ebpo_ply_parser *p, uint64_t array, uint64_t row, uint64_t end)
 {
+    ebpo_attribute *a = &p->mesh->attributes->array[array];
     size_t bytes = ebpo_attribute_bytes(a->type);
     uint64_t begin = row ? a->ends[row - 1] : 0, count = a->ends[row] - begin;
-    if (!ebpo_attribute_reserve(p->mesh->workspace, a, end, begin + (end - row) * count))
+    uint64_t left = REPEATED_LEAST + REPEATED_FACTOR * p->size - p->repeated_bytes;
+    if (count && !p->lost[array] && end - row - 1 > left / bytes / count) {
+        ebpo_attributes_lose(p->mesh->attributes,
+                             "property '%s' of 'face' (copies for all triangles of the polygons "
+                             "take more than 1 GiB and 64 times the file)",
+                             a->names);
+        p->lost[array] = true;
+    }
+    count = p->lost[array] ? 0 : count;
+    p->repeated_bytes += (end - row - 1) * count * bytes;
+    if (!ebpo_attribute_reserve(p->mesh->workspace, a, end, a->ends[row] + (end - row - 1) * count))
         return fail_rows(p, (end - row) * count * bytes);
     for (uint64_t i = row + 1; i < end; i++) {
         if (count)
@@ -295,7 +314,7 @@ ebpo_status ebpo_ply_repeat_face(ebpo_ply_parser *p, uint64_t row)
         if (a->list == EBPO_ATTRIBUTE_NO_LIST)
             repeat_columns(a, row, end);
         else
-            status = repeat_list(p, a, row, end);
+            status = repeat_list(p, i, row, end);
     }
     return status;
 }

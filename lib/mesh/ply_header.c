@@ -99,11 +99,13 @@ static int split_line(ebpo_ply_word line, ebpo_ply_word words[MAX_WORDS])
     return n;
 }
 
-static bool parse_type(ebpo_ply_word word, ebpo_ply_type *type)
+/* Parses a type. A name such as float32 counts as a note, because a new header would have float. */
+static bool parse_type(reader *r, ebpo_ply_word word, ebpo_ply_type *type)
 {
     for (size_t i = 0; i < sizeof type_names / sizeof *type_names; i++)
         if (word_is(word, type_names[i].word)) {
             *type = type_names[i].type;
+            r->header->notes += i > EBPO_PLY_FLOAT64;
             return true;
         }
     return false;
@@ -218,10 +220,10 @@ static ebpo_status property_statement(reader *r, const ebpo_ply_word *words, int
     ebpo_ply_property property = { .list = n > 1 && word_is(words[1], "list"), .attribute = -1 };
     if (n != (property.list ? 5 : 3))
         return fail_in_line(r, "wrong number of words in", words[0]);
-    if (!parse_type(words[n - 2], &property.type))
+    if (!parse_type(r, words[n - 2], &property.type))
         return fail_in_line(r, "unknown type", words[n - 2]);
     if (property.list &&
-        (!parse_type(words[2], &property.count_type) || property.count_type >= EBPO_PLY_FLOAT32))
+        (!parse_type(r, words[2], &property.count_type) || property.count_type >= EBPO_PLY_FLOAT32))
         return fail_in_line(r, "invalid type for a list length:", words[2]);
     property.name = words[n - 1];
     ebpo_ply_element *element = &h->element[h->elements - 1];

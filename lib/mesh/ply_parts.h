@@ -76,7 +76,9 @@ typedef struct ebpo_ply_header {
     ebpo_ply_property *property;
     uint64_t properties, property_capacity;
     int64_t vertex, face, strips; /* element indices, or -1 */
-    uint64_t notes;               /* lines that are comments, obj_info or unknown */
+    /* number of lines that are comments, obj_info or unknown, and of types with names such as
+     * float32 */
+    uint64_t notes;
 } ebpo_ply_header;
 
 enum { EBPO_PLY_HEADER_LONGEST = 1 << 20 }; /* in bytes */
@@ -126,6 +128,8 @@ typedef struct ebpo_ply_parser {
     bool *lost; /* [attribute arrays] true if a value does not fit its type; NULL: attributes are
                  * not read */
     uint64_t faces_reserved; /* rows reserved for face attributes */
+    uint64_t
+        repeated_bytes; /* bytes of lists that were copied to the other triangles of polygons */
     ebpo_error *error;
 } ebpo_ply_parser;
 

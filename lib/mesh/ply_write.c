@@ -238,12 +238,15 @@ static void add_rest(making *m, const char *element)
     }
 }
 
-/* Returns the number of rows of an element of attributes, or 0. */
-static uint64_t rows_of(const making *m, ebpo_ply_word element)
+/* Returns the number of rows of an element other than vertices and faces; 0 if the mesh does not
+ * have its attributes. An element without properties has no attributes. */
+static uint64_t rows_of(const making *m, const ebpo_ply_element *element)
 {
+    if (!element->properties)
+        return element->count;
     for (uint64_t i = 0; i < array_count(m); i++) {
         const ebpo_attribute *a = &m->mesh->attributes->array[i];
-        if (is_word(a->element, strlen(a->element), element))
+        if (is_word(a->element, strlen(a->element), element->name))
             return a->rows;
     }
     return 0;
@@ -327,7 +330,7 @@ static void follow_element(following *f)
     const ebpo_ply_element *e = &f->header.element[f->element++];
     f->kind = e->kind == EBPO_PLY_KIND_STRIPS ? EBPO_PLY_KIND_FACE : e->kind;
     f->rows = e->kind == EBPO_PLY_KIND_VERTEX  ? m->mesh->vertex_count
-              : e->kind == EBPO_PLY_KIND_OTHER ? rows_of(m, e->name)
+              : e->kind == EBPO_PLY_KIND_OTHER ? rows_of(m, e)
                                                : m->mesh->face_count;
     f->skipped = f->kind == EBPO_PLY_KIND_FACE ? m->faces : f->rows == 0 && e->count != 0;
     if (e->kind == EBPO_PLY_KIND_STRIPS && f->header.face >= 0)

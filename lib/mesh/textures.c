@@ -402,13 +402,16 @@ static span whole_text(const uint8_t *text, uint64_t bytes)
     return (span){ (const char *)text + bom, bytes - bom };
 }
 
-/* Reads the next line. Returns false when there is none. */
+/* Reads the next line, which ends with a line feed or a carriage return. (Between the two bytes of
+ * a DOS line end, there is an empty line.) Returns false when there is none. */
 static bool next_line(span *text, span *line)
 {
+    size_t n = 0;
     if (!text->n)
         return false;
-    const char *stop = memchr(text->s, '\n', text->n);
-    size_t n = stop ? (size_t)(stop - text->s) : text->n, step = n + (stop != NULL);
+    while (n < text->n && text->s[n] != '\n' && text->s[n] != '\r')
+        n++;
+    size_t step = n + (n < text->n);
     *line = (span){ text->s, n };
     *text = (span){ text->s + step, text->n - step };
     return true;

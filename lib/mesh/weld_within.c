@@ -40,7 +40,7 @@ typedef struct grouping {
     uint32_t *slots;
     uint32_t *chain; /* [vertex_count] next vertex of this list */
     uint64_t mask;
-    /* [threads] largest squared distance of a vertex from the vertex that replaces it */
+    /* [threads] largest distance of a vertex from the vertex that replaces it */
     double *moved;
 } grouping;
 
@@ -106,6 +106,20 @@ static double squared_distance(const double p[3], const double q[3])
 {
     double d[3] = { p[0] - q[0], p[1] - q[1], p[2] - q[2] };
     return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+}
+
+/* Returns the distance of p and q. Scales the difference where its square could overflow or
+ * underflow. */
+static double distance_between(const double p[3], const double q[3])
+{
+    double square = squared_distance(p, q), most = 0, sum = 0;
+    if (square > 0x1p-900 && square < 0x1p900)
+        return sqrt(square);
+    for (int k = 0; k < 3; k++)
+        most = fmax(most, fabs(p[k] - q[k]));
+    for (int k = 0; k < 3 && most > 0; k++)
+        sum += (p[k] - q[k]) / most * ((p[k] - q[k]) / most);
+    return most * sqrt(sum);
 }
 
 /* Returns true if rounded squared distances can be compared. */
@@ -224,7 +238,7 @@ static ebpo_status choose_nearest(void *context, uint64_t begin, uint64_t end, u
         ebpo_mesh_position(g->mesh, v, p);
         g->map[v] = find_staying(g, p, true);
         ebpo_mesh_position(g->mesh, g->map[v], q);
-        g->moved[worker] = fmax(g->moved[worker], squared_distance(p, q));
+        g->moved[worker] = fmax(g->moved[worker], distance_between(p, q));
     }
     return EBPO_OK;
 }
@@ -314,7 +328,7 @@ static ebpo_status group_vertices(grouping *g, uint32_t *from, uint64_t *kept, d
     if (status != EBPO_OK)
         return status;
     for (unsigned t = 0; t < threads; t++)
-        *moved = fmax(*moved, sqrt(g->moved[t]));
+        *moved = fmax(*moved, g->moved[t]);
     *kept = number_staying(g, from);
     return EBPO_OK;
 }

@@ -1,5 +1,6 @@
 /* Tests data of a PLY file besides positions and corners: it is read in each encoding; kept by
  * building, writing and reading; split and merged with the mesh; and written unchanged. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,6 +11,7 @@
 
 #include "mesh/attributes.h"
 #include "check_main.h"
+#include "core/text.h"
 #include "format/read_attributes.h"
 #include "format/chunks.h"
 #include "format/pick_rows.h"
@@ -498,6 +500,41 @@ START_TEST(test_attributes_of_triangles_follow_polygon)
 }
 END_TEST
 
+/* A list of as many items as its polygon has corners would be copied to each of the polygon's
+ * triangles. The other attributes stay. */
+START_TEST(test_attributes_copies_of_lists_are_limited)
+{
+    enum { CORNERS = 36000 };
+    ebpo_text_stream text;
+    ck_assert(ebpo_text_stream_begin(&text));
+    fprintf(text.file,
+            "ply\nformat ascii 1.0\nelement vertex %d\nproperty float x\nproperty float y\n"
+            "property float z\nelement face 2\nproperty list int int vertex_indices\n"
+            "property list int uchar words\nproperty uchar label\nend_header\n",
+            CORNERS);
+    for (int i = 0; i < CORNERS; i++)
+        fprintf(text.file, "%.9g %.9g 0\n", cos(2 * M_PI * i / CORNERS),
+                sin(2 * M_PI * i / CORNERS));
+    fprintf(text.file, "%d", CORNERS);
+    for (int i = 0; i < CORNERS; i++)
+        fprintf(text.file, " %d", i);
+    fprintf(text.file, " %d", CORNERS);
+    for (int i = 0; i < CORNERS; i++)
+        fputs(" 1", text.file);
+    fputs(" 7\n4 0 2 1 9 1 5 8\n", text.file);
+    ck_assert(ebpo_text_stream_end(&text));
+    ebpo_mesh mesh = parse((const uint8_t *)text.text, text.bytes);
+    free(text.text);
+    ck_assert_uint_eq(mesh.face_count, CORNERS);
+    const char *lost = ebpo_mesh_attributes_lost(&mesh);
+    ck_assert(lost && strstr(lost, "property 'words' of 'face' (copies"));
+    ck_assert_uint_eq(mesh.attributes->count, 1);
+    const ebpo_attribute *label = &mesh.attributes->array[0];
+    ck_assert(label->values[CORNERS - 3] == 7 && label->values[CORNERS - 2] == 8);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 static const char strip_vertices[] =
     "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
     "property float z\n";
@@ -550,6 +587,32 @@ START_TEST(test_attributes_ply_writes_every_property)
     ck_assert(memcmp(back.faces, mesh.faces, 6 * sizeof *back.faces) == 0);
     ebpo_mesh_free(&mesh);
     ebpo_mesh_free(&back);
+}
+END_TEST
+
+/* Types have two names. A mesh without other data is also written with the names of its source, and
+ * with elements that have no properties. */
+START_TEST(test_attributes_ply_keeps_source_header)
+{
+    static const char head[] = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n"
+                               "property float32 x\nproperty float32 y\nproperty float32 z\n"
+                               "element face 1\nproperty list uint8 int32 vertex_indices\n"
+                               "element mark 2\nend_header\n";
+    enum { HEAD = sizeof head - 1, BODY = 36 + 13 };
+    uint8_t data[HEAD + BODY] = { 0 }, written[HEAD + BODY + 1];
+    memcpy(data, head, HEAD);
+    data[HEAD + 15] = 0x3f; /* the second vertex has x = 0.5, the third has y = 0.5 */
+    data[HEAD + 31] = 0x3f;
+    data[HEAD + 36] = 3;
+    data[HEAD + 41] = 1;
+    data[HEAD + 45] = 2;
+    ebpo_mesh mesh = parse(data, sizeof data);
+    fine(ebpo_mesh_write_ply(&mesh, scratch("a.ply"), &error));
+    FILE *f = fopen(scratch("a.ply"), "rb");
+    ck_assert_uint_eq(fread(written, 1, sizeof written, f), sizeof data);
+    fclose(f);
+    ck_assert_mem_eq(written, data, sizeof data);
+    ebpo_mesh_free(&mesh);
 }
 END_TEST
 
@@ -637,8 +700,10 @@ TEST_SUITE(mesh_attributes)
     tcase_add_test(tests, test_attributes_pick_of_no_rows);
     tcase_add_test(tests, test_attributes_of_joined_vertices_keep_first);
     tcase_add_test(tests, test_attributes_of_triangles_follow_polygon);
+    tcase_add_test(tests, test_attributes_copies_of_lists_are_limited);
     tcase_add_test(tests, test_attributes_of_strips_are_empty);
     tcase_add_test(tests, test_attributes_ply_writes_every_property);
+    tcase_add_test(tests, test_attributes_ply_keeps_source_header);
     tcase_add_test(tests, test_attributes_report_lost_properties);
     tcase_add_test(tests, test_attributes_of_elements_with_equal_name);
     tcase_add_test(tests, test_attributes_are_listed_by_file);

@@ -164,26 +164,37 @@ START_TEST(test_weld_within_matches_all_pairs)
 }
 END_TEST
 
-/* Welds separate triangles of a sphere, whose corners have an error of up to a tenth of the weld
- * distance. */
+/* Welds separate triangles of a torus, whose corners have an error of up to a tenth of the weld
+ * distance. Squares of the moves of the small and the large torus underflow and overflow. */
 START_TEST(test_weld_within_noisy_soup)
 {
-    ebpo_mesh mesh = ebpo_test_make("torus");
-    ebpo_error error = EBPO_ERROR_INIT;
-    ebpo_repair_record record;
-    ebpo_mesh_report report;
-    uint64_t vertices = mesh.vertex_count;
-    double distance = 0.001;
-    memset(&record, 0, sizeof record);
-    ebpo_test_split_vertices(&mesh);
-    for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
-        mesh.xyz64[i] += distance / 10 * ((double)below(2001) / 1000 - 1);
-    ck_assert(ebpo_mesh_weld_within(&mesh, distance, &record, &error) == EBPO_OK);
-    ck_assert(record.weld_moved > 0 && record.weld_moved <= 0.4 * distance);
-    ck_assert_uint_eq(mesh.vertex_count, vertices);
-    ck_assert(ebpo_mesh_check(&mesh, 0, silent, &report, &error) == EBPO_OK);
-    ck_assert(report.manifold && report.genus == 1);
-    ebpo_mesh_free(&mesh);
+    static const int exponents[] = { 0, -660, 660 };
+    double first_moved = 0;
+    for (int i = 0; i < 3; i++) {
+        ebpo_mesh mesh = ebpo_test_make("torus");
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_repair_record record;
+        ebpo_mesh_report report;
+        uint64_t vertices = mesh.vertex_count;
+        double distance = 0.001;
+        state = 5;
+        memset(&record, 0, sizeof record);
+        ebpo_test_split_vertices(&mesh);
+        for (uint64_t k = 0; k < 3 * mesh.vertex_count; k++) {
+            mesh.xyz64[k] += distance / 10 * ((double)below(2001) / 1000 - 1);
+            mesh.xyz64[k] = ldexp(mesh.xyz64[k], exponents[i]);
+        }
+        distance = ldexp(distance, exponents[i]);
+        ck_assert(ebpo_mesh_weld_within(&mesh, distance, &record, &error) == EBPO_OK);
+        ck_assert(record.weld_moved > 0 && record.weld_moved <= 0.4 * distance);
+        first_moved = i == 0 ? record.weld_moved : first_moved;
+        ck_assert_double_eq_tol(ldexp(record.weld_moved, -exponents[i]), first_moved,
+                                1e-15 * first_moved);
+        ck_assert_uint_eq(mesh.vertex_count, vertices);
+        ck_assert(ebpo_mesh_check(&mesh, 0, silent, &report, &error) == EBPO_OK);
+        ck_assert(report.manifold && report.genus == 1);
+        ebpo_mesh_free(&mesh);
+    }
 }
 END_TEST
 
