@@ -27,6 +27,7 @@
 #include "derive/subset_parts.h"
 #include "format/border_loops.h"
 #include "format/file_nodes.h"
+#include "format/level_volumes.h"
 #include "format/patch_table.h"
 #include "format/reader.h"
 #include "format/subtree_index.h"
@@ -308,6 +309,22 @@ static ebpo_status cut_surface(ebpo_cutting *c)
     return status;
 }
 
+/* Computes the volumes of envelopes if nodes were cut out of levels, or planes were omitted. */
+static void measure_levels(ebpo_cutting *c)
+{
+    ebpo_tree *out = c->out;
+    double gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
+    uint32_t lost = c->from->parts & ~c->parts;
+    bool all = ((c->options->boxed || c->tolerance) && out->info.pruned) || lost & EBPO_PART_PLANES;
+    if (!all && !(lost & EBPO_PART_LEAF_PLANES))
+        return;
+    ebpo_tree_volumes(out, c->parts, gray, leaf);
+    for (int i = 0; i < out->info.level_count; i++) {
+        out->level[i].gray_volume = all ? gray[i] : out->level[i].gray_volume;
+        out->level[i].leaf_volume = leaf[i];
+    }
+}
+
 /* Makes the tree of the subset. `tolerance` decides which envelopes are close enough to the model;
  * it may be NULL if there is no max_error. */
 static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
@@ -339,10 +356,8 @@ static ebpo_status subset_tree_within(ebpo_tree *out, const ebpo_file *file,
         ebpo_tree_free(out);
         return status;
     }
-    bool lost_planes = c.from->parts & ~c.parts & EBPO_PART_PLANES;
     out->info.parts = c.parts;
-    if (((options->boxed || c.tolerance) && out->info.pruned) || lost_planes)
-        ebpo_cut_volumes(&c);
+    measure_levels(&c);
     if (!out->info.pruned) {
         out->info.cut_levels = 0;
         out->info.boxed = false;

@@ -1,4 +1,4 @@
-/* Makes the levels of a subset: the nodes that remain, and their volumes. Here the "source" is the
+/* Makes the levels of a subset: the nodes that remain. Here the "source" is the
  * file from which the subset is made, and the "result" is the subset. Gray nodes have children, and
  * leaves list faces.
  *
@@ -7,10 +7,7 @@
  * children are omitted becomes a pruned node. A leaf that is omitted also becomes a pruned node.
  * All arrays of a level (ebpo_schema) are copied node by node for the remaining nodes. Faces keep
  * their indices in the source until subset_faces.c gives them new indices. With max_error, all
- * envelopes of a level are tested together (error_bound.h). The volume of a node is the volume of
- * its envelope: the node's cell, cut by the planes that the file stores for the node and its
- * ancestors. (If the file stores no planes of leaves, ebpo_lod_level derives planes of leaves. The
- * volumes here are computed without derived planes.) */
+ * envelopes of a level are tested together (error_bound.h). */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -24,7 +21,6 @@
 #include "format/subtree_index.h"
 #include "geometry/cells.h"
 #include "geometry/level_nodes.h"
-#include "geometry/polytope.h"
 #include "levels/lod.h"
 
 /* --- copying the arrays of remaining nodes --- */
@@ -570,63 +566,4 @@ ebpo_status ebpo_cut_levels(ebpo_cutting *c)
     for (int i = 0; i < info->level_count && !info->pruned; i++)
         c->out->level[i].pruned_count = 0;
     return EBPO_OK;
-}
-
-/* --- volumes of envelopes --- */
-
-/* The computation of volumes. The walk visits nodes in stored order. */
-typedef struct measuring {
-    ebpo_cutting *c;
-    /* for each level: index of the next group, gray node, leaf, plane, and plane of a leaf */
-    uint64_t group[EBPO_LEVELS_MAX], gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX],
-        plane[EBPO_LEVELS_MAX], leaf_plane[EBPO_LEVELS_MAX];
-} measuring;
-
-/* Cuts the envelope by the planes of the node with rank *node, whose first plane is *plane. Then
- * increases *node and *plane to the next node and its first plane. */
-static void cut_envelope(ebpo_polytope *envelope, const uint8_t *counts, const uint32_t *planes,
-                         uint64_t *node, uint64_t *plane)
-{
-    uint64_t count = counts ? counts[*node] : 0;
-    if (count)
-        ebpo_planes_cut(envelope, planes + *plane, count);
-    *plane += count;
-    ++*node;
-}
-
-/* Adds the volumes of the envelopes of the level's next group, and of all groups below it, to the
- * volumes of their levels. `parent` is the envelope of the group's parent; NULL: the group contains
- * the root. */
-static void measure_group(measuring *m, int level, const ebpo_polytope *parent)
-{
-    ebpo_tree *tree = m->c->out;
-    ebpo_level *l = &tree->level[level];
-    uint16_t types = l->types[m->group[level]++];
-    for (unsigned octant = 0; octant < ebpo_group_octants(level); octant++) {
-        ebpo_node_type type = ebpo_group_type(types, octant);
-        ebpo_polytope envelope;
-        if (type != EBPO_GRAY && type != EBPO_LEAF)
-            continue;
-        if (parent)
-            (void)ebpo_polytope_child(parent, octant, &envelope);
-        else
-            ebpo_polytope_cube(&envelope);
-        if (type == EBPO_GRAY)
-            cut_envelope(&envelope, l->plane_counts, l->planes, &m->gray[level], &m->plane[level]);
-        else
-            cut_envelope(&envelope, l->leaf_plane_counts, l->leaf_planes, &m->leaf[level],
-                         &m->leaf_plane[level]);
-        *(type == EBPO_GRAY ? &l->gray_volume : &l->leaf_volume) +=
-            ebpo_polytope_volume(&envelope) * ebpo_cell_volume(&m->c->box, level);
-        if (type == EBPO_GRAY && level + 1 < tree->info.level_count)
-            measure_group(m, level + 1, &envelope);
-    }
-}
-
-void ebpo_cut_volumes(ebpo_cutting *c)
-{
-    measuring m = { .c = c };
-    for (int i = 0; i < c->out->info.level_count; i++)
-        c->out->level[i].gray_volume = c->out->level[i].leaf_volume = 0;
-    measure_group(&m, 0, NULL);
 }

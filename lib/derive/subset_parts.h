@@ -34,9 +34,6 @@ EBPO_MUST_USE ebpo_status ebpo_cut_levels(ebpo_cutting *c);
  * removes these parts. */
 EBPO_MUST_USE ebpo_status ebpo_cut_faces(ebpo_cutting *c);
 
-/* Computes the volumes of the levels of the subset from the envelopes of the nodes that remain. */
-void ebpo_cut_volumes(ebpo_cutting *c);
-
 /* Makes the tree of the subset that ebpo_subset would write. Tests call this function, too. */
 EBPO_MUST_USE ebpo_status ebpo_subset_tree(ebpo_tree *out, const ebpo_file *file,
                                            const ebpo_subset_options *options, ebpo_error *error);

@@ -19,6 +19,7 @@
 #include "format/content_checksum.h"
 #include "format/chunk_layout.h"
 #include "format/head_facts.h"
+#include "format/level_volumes.h"
 #include "format/schema.h"
 #include "format/surface_patches.h"
 #include "format/write_plan.h"
@@ -558,6 +559,22 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
     return status;
 }
 
+/* Computes the volumes of envelopes if planes of the tree are not written. */
+static void measure_levels(ebpo_plan *plan)
+{
+    double gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
+    ebpo_info *info = &plan->info;
+    uint32_t lost = plan->tree->info.parts & ~info->parts;
+    if (!(lost & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
+        return;
+    ebpo_tree_volumes(plan->tree, info->parts, gray, leaf);
+    for (int i = 0; i < info->level_count; i++) {
+        if (lost & EBPO_PART_PLANES)
+            info->level[i].gray_volume = gray[i];
+        info->level[i].leaf_volume = leaf[i];
+    }
+}
+
 static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
 {
     for (int i = 0; i < plan->info.level_count; i++) {
@@ -711,6 +728,8 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     ebpo_status status = resolve_facts(plan, options, &check, error);
     if (status == EBPO_OK)
         status = check_tree(plan, &check, error);
+    if (status == EBPO_OK)
+        measure_levels(plan);
     if (status == EBPO_OK)
         status = index_levels(plan, error);
     if (status == EBPO_OK && plan->info.parts & EBPO_PART_MESH)
