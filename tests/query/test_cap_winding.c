@@ -426,7 +426,7 @@ END_TEST
 static void check_boxes(judge *j, const holed *h, const double q[3], const double half[3],
                         const double p[3])
 {
-    ebpo_cap_lists lists = { NULL, 0, 0 };
+    ebpo_cap_lists lists = { NULL, NULL, 0, 0 };
     ebpo_cap_front *front = malloc(sizeof *front);
     ebpo_bounded far = { 0, 0 };
     uint64_t begin = 0, end = h->tree.node_count > 0;
