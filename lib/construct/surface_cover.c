@@ -135,7 +135,7 @@ static double distance_outside(const ebpo_cover_side *side, const double at[2])
 }
 
 /* Returns a vertex of the surface in the frame of the current triangle. */
-static const ebpo_cover_vertex *project(ebpo_cover *c, uint32_t vertex)
+static const ebpo_cover_vertex *project_vertex(ebpo_cover *c, uint32_t vertex)
 {
     ebpo_cover_vertex *v = &c->vertex[vertex];
     if (v->turn == c->turn)
@@ -155,7 +155,7 @@ static bool is_outside(ebpo_cover *c, uint64_t t, const ebpo_cover_vertex *corne
 {
     const uint32_t *v = c->surface->triangle + 3 * t;
     for (int k = 0; k < 3; k++)
-        corner[k] = project(c, v[k]);
+        corner[k] = project_vertex(c, v[k]);
     return (corner[0]->outside & corner[1]->outside & corner[2]->outside) != 0;
 }
 

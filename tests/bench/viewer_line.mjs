@@ -1,6 +1,7 @@
 // Measures the viewer in a headless Chromium over a slow line: viewer_line.mjs [OPTION VALUE ...] MODEL.ebpo.h5 ...
 // Prints a table row for each model: time to the first picture (median of the rounds) and to the settled picture, requests and bytes of the model until
-// then, triangles, and the bytes that a second visit fetches. All connections share the line in turns.
+// then, all bytes that the line delivered (fewer if responses are ended early, as the server has sent more), triangles, and the bytes of a second visit.
+// All connections share the line in turns.
 // --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (appended to the URL)   --sources (not bundled)
 // --viewer ROOT (another checkout)   --near 0.03 (another row: the time of a click's distance; then the camera is at this many box diagonals from the point)
 import { spawn } from 'node:child_process';
@@ -26,6 +27,7 @@ const { chromium } = await import(pathToFileURL(join(viewer, 'node_modules/playw
 
 const PIECE = 4096, QUEUE = 65536; // bytes of a turn, and bytes that the line stores for a connection
 
+let delivered = 0; // bytes
 // Starts a line from a new port to `to`. It delays every connection and every byte, and limits the rate of bytes. Connections take turns.
 function line(to) {
   const waiting = []; // connections with something to send: { queue, send }
@@ -40,6 +42,7 @@ function line(to) {
     next.queue = next.queue.subarray(PIECE);
     if (next.queue.length)
       waiting.push(next);
+    delivered += piece.length;
     next.sent(piece);
     free = Math.max(free, performance.now()) + piece.length * 8 / options.kbits;
     setTimeout(turn, free - performance.now());
@@ -98,16 +101,17 @@ async function serve() {
   return `http://localhost:${slow.address().port}/`;
 }
 
-let logged = 0;
+let logged = 0, counted = 0;
 // Returns what was sent of the model and of the page since the last call.
 function traffic() {
-  const lines = readFileSync(log, 'utf8').split('\n').filter(Boolean), sums = { requests: 0, bytes: 0, page: 0 };
+  const lines = readFileSync(log, 'utf8').split('\n').filter(Boolean), sums = { requests: 0, bytes: 0, page: 0, line: delivered - counted };
   for (const text of lines.slice(logged)) {
     const bytes = Number(/" \d+ (\d+) "/.exec(text)[1]), isModel = text.includes('/models/') && !text.includes('index.json');
     sums.requests += isModel ? 1 : 0;
     sums[isModel ? 'bytes' : 'page'] += bytes;
   }
   logged = lines.length;
+  counted = delivered;
   return sums;
 }
 
@@ -192,7 +196,8 @@ async function measure(browser, site, model) {
   }
   const of = (what) => median(rounds.map(what)), { stats } = rounds[0];
   console.log(`| ${basename(model)} | ${kilo(of((r) => r.page))} | ${seconds(of((r) => r.first))} | ${seconds(of((r) => r.settled))} | ${of((r) => r.requests)} | ${kilo(of((r) => r.bytes))} `
-    + `| ${stats.triangles} | ${stats.wallTriangles} | ${stats.meshTriangles} | ${again.requests} | ${kilo(again.bytes)} | ${seconds(again.first)} |`);
+    + `| ${kilo(of((r) => r.line))} | ${stats.triangles} | ${stats.wallTriangles} | ${stats.meshTriangles} `
+    + `| ${again.requests} | ${kilo(again.bytes)} | ${kilo(again.line)} | ${seconds(again.first)} |`);
 }
 
 let code = 0;
@@ -203,8 +208,8 @@ try {
   cleanup.push(() => browser.close());
   console.log(`${options.kbits} kbit/s, ${options.ms} ms, ${options.rounds} rounds${options.query && ', ' + options.query}${options.sources ? ', not bundled' : ''}; ` +
     'page and model in kB, times in s\n');
-  console.log('| model | page | first picture | settled | requests | model | triangles | on walls | real faces | again: requests | model | first picture |\n' +
-    '|---|---|---|---|---|---|---|---|---|---|---|---|');
+  console.log('| model | page | first picture | settled | requests | model | line | triangles | on walls | real faces | again: requests | model | line | first picture |\n' +
+    '|---|---|---|---|---|---|---|---|---|---|---|---|---|---|');
   for (const model of models)
     await measure(browser, site, model);
 } catch (error) {

@@ -4,7 +4,8 @@
   const FIRST_BYTES = 1 << 20;    // the first response contains small models completely, and the upper levels of large models
   const COARSE_BYTES = 1 << 17;   // when the address selects few levels
   const COARSE_LEVEL = 5;
-  const HEAD_BYTES = 1 << 17;     // the worker can begin with so many bytes
+  const HEAD_BYTES = 1 << 17;     // the worker can begin with so many bytes, and requests more of a large file if it needs more; as in model_file.js
+  const LARGE_FILE = 1 << 21;     // as in worker.js
   const PATIENCE_MS = 1500;       // longest time for which app.js waits for HEAD_BYTES
   const FIELD_OF_VIEW = 38;       // vertical, in degrees
   const WASM = 'ebpo/ebpo-view.wasm';
@@ -79,6 +80,7 @@
   boot.over = () => clearInterval(timer);
   (async () => {
     const response = await fetch(boot.url, { cache: 'no-cache', signal: abort.signal, headers: { Range: `bytes=0-${boot.ahead - 1}` } });
+    const large = Number(/\d+$/.exec(response.headers.get('content-range') ?? '')) > LARGE_FILE;
     post({ head: { status: response.status, statusText: response.statusText, headers: [...response.headers] } });
     for (const reader = response.body.getReader(); ;) {
       const { done, value } = await reader.read();
@@ -87,8 +89,13 @@
       got += value.length;
       last = performance.now();
       post({ bytes: value }, [value.buffer]);
-      if (got >= HEAD_BYTES)
-        begin();
+      if (got < HEAD_BYTES)
+        continue;
+      begin();
+      if (large) {
+        abort.abort();
+        break;
+      }
     }
     post({ end: true });
   })().catch((error) => post({ failed: error.message })).finally(begin);

@@ -5,7 +5,8 @@ import { EbpoError } from './error.js';
 import { KeptSource } from './kept_source.js';
 import { sourceOf } from './source.js';
 
-const HEAD_BYTES = 128 * 1024;
+/** Bytes with which a file can be opened. */
+export const HEAD_BYTES = 128 * 1024;
 
 // Returns the header by the names of the format.
 function infoOf(info) {

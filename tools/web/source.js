@@ -111,6 +111,7 @@ class Transfer {
  *   `fetch`       another implementation of fetch()
  *   `headers`     headers of the requests, for credentials
  *   `ahead`       least size of the first request; its bytes can be read as they arrive
+ *   `enoughOf`    function of the file's size: the first response is ended when it has so many bytes; by default it is not ended
  *   `patient`     when the connection is lost, an open file waits for `retry()` instead of failing
  */
 export class UrlSource {
@@ -122,6 +123,7 @@ export class UrlSource {
     this.wholeLimit = options.wholeLimit ?? 64 * 1024 * 1024;
     this.timeout = options.timeout ?? 30000;
     this.ahead = options.ahead ?? 0;
+    this.enoughOf = options.enoughOf ?? (() => Infinity);
     this.patient = options.patient ?? false;
     this.requests = this.bytes = 0;
     this.size = undefined;
@@ -136,6 +138,7 @@ export class UrlSource {
   }
 
   async open(bytes) {
+    this.asked = bytes;
     this.first = new Transfer(0, Math.max(bytes, this.ahead));
     const all = this.#run(this.first, true), enough = this.first.reaches(bytes);
     all.catch(() => {}); // a later failure is reported to the reader of the bytes
@@ -157,17 +160,19 @@ export class UrlSource {
     return have === offset ? rest.data : joined([first.data.subarray(offset, have), rest.data]);
   }
 
-  /** Ends the first response early, because most of its remaining bytes are not needed. Bytes that are needed later are requested again. */
-  stop() {
-    const { first } = this, abort = this.running.get(first);
-    if (!abort || this.whole)
+  /** Requests the file's first `bytes` bytes, as far as the first response does not have them. They can be read as they arrive. */
+  extend(bytes) {
+    const { first } = this, to = Math.min(bytes, this.size);
+    if (this.whole || to <= first.to)
       return;
-    first.to = first.end;
-    first.finish();
-    abort.abort();
+    first.data = first.data && joined([first.data, new Uint8Array(to - first.data.length)]);
+    first.to = to;
+    first.requested = false; // the new bytes may be in the browser's cache
+    if (!this.running.has(first))
+      this.#run(first, false).catch(() => {}); // reported to the readers of the bytes
   }
 
-  /** The number of the file's first bytes that the first response has or will have. Reading them needs no further request. */
+  /** The number of the file's first bytes that have been requested at once. Reading them needs no further request. */
   get coming() {
     return this.whole ? this.whole.length : this.first ? (this.running.has(this.first) ? Math.min(this.first.to, this.size ?? 0) : this.first.end) : 0;
   }
@@ -285,10 +290,11 @@ export class UrlSource {
         await this.#takeWhole(response, first, alive);
         return;
       }
-      const want = this.#partial(response, offset, length, first), had = transfer.got;
+      const sent = this.#partial(response, offset, length, first), had = transfer.got;
+      const want = first ? Math.min(sent, Math.max(this.asked, this.enoughOf(this.size))) : sent;
       if (first)
         transfer.to = offset + want;
-      await this.#drain(response, want, alive, (bytes) => transfer.add(bytes));
+      await this.#drain(response, sent, alive, (bytes) => transfer.add(bytes), want);
       if (transfer.got - had !== want)
         throw transient(`the server sent ${transfer.got - had} bytes of ${want}`, 'try again');
     } catch (cause) {
@@ -356,8 +362,8 @@ export class UrlSource {
     return this.#fail(`the server does not serve ranges, and the file has ${size}`, 'use a server that returns status 206, or download the file and open it from disk');
   }
 
-  // Reads and counts the body. Throws when it is longer than stated.
-  async #drain(response, want, alive, take) {
+  // Reads and counts the body, or its first `enough` bytes. Throws when it is longer than stated.
+  async #drain(response, want, alive, take, enough = Infinity) {
     const most = want ?? this.wholeLimit;
     let total = 0;
     for (const reader = response.body.getReader(); ;) {
@@ -369,7 +375,9 @@ export class UrlSource {
       this.bytes += value.length;
       if (total > most)
         throw want === undefined ? this.#noRanges(`more than ${most} bytes`) : this.#fail('the server sent more bytes than it stated', 'use another server');
-      take(value);
+      take(total > enough ? value.subarray(0, value.length - total + enough) : value);
+      if (total >= enough && enough < want)
+        return;
     }
   }
 }

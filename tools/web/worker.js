@@ -6,7 +6,7 @@ import { reachOf } from './reach.js';
 import { Cut } from './cut.js';
 import { fetchAfter, takeFirst } from './first_response.js';
 import { addLevels, growForView } from './grow.js';
-import { openModel } from './model_file.js';
+import { HEAD_BYTES, openModel } from './model_file.js';
 import { viewModule } from './ebpo/view.js'; // workers have no import maps
 import { UrlSource, sourceOf } from './source.js';
 import { KEY, Surface } from './surface.js';
@@ -15,7 +15,7 @@ import { Tree } from './tree.js';
 const LINE_MS = 250;                      // interval between reports of progress to the page
 const TIMEOUT_MS = 20000;                 // longest time without a byte
 const FIRST_LEVELS = 5;                   // normally contained in the response to the first request
-const LARGE_FILE = 2 * 1024 * 1024;       // files of more bytes are not read beyond the first levels, if their surface is drawn
+const LARGE_FILE = 2 * 1024 * 1024;       // the first response of larger files is ended early: if their surface is drawn, most of it would be unused envelopes
 const SMALL_FILE = 8 * 1024 * 1024;       // files of fewer bytes are small
 const MESH_BYTES_A_VIEW = 16 * 1024 * 1024; // for larger meshes: limit of fetched bytes until the camera moves
 const SUBTREE_BYTES_A_VIEW = 1.5 * 1024 * 1024; // the same limit for files with subtrees, where few fetched bytes are unused
@@ -52,9 +52,13 @@ class OpenFile {
   }
 
   async open(what, ahead, cacheBytes) {
-    this.source = typeof what === 'string' ? new UrlSource(what, { ahead, timeout: TIMEOUT_MS, patient: true, fetch: fetchAfter(() => post(this.slot, { type: 'forget' })) }) : sourceOf(what);
+    const enoughOf = (size) => (size > LARGE_FILE ? HEAD_BYTES : Infinity);
+    const fetch = fetchAfter(() => post(this.slot, { type: 'forget' }));
+    this.source = typeof what === 'string' ? new UrlSource(what, { ahead, enoughOf, timeout: TIMEOUT_MS, patient: true, fetch }) : sourceOf(what);
     this.file = await openModel(this.source, { ...(module && { module }), ...(cacheBytes && { cacheBytes }) });
     const { info, source } = this.file;
+    if (!this.#drawsSurface())
+      source.extend?.(ahead);
     this.tree = new Tree(info);
     this.queries = new Queries(this.file);
     this.cut = new Cut(this.tree, { small: source.size < SMALL_FILE });
@@ -63,8 +67,6 @@ class OpenFile {
     this.file.sums?.catch((error) => this.ended || post(this.slot, { type: 'failed', opening: this.number, error: describe(error), late: true }));
     await this.load(Math.min(FIRST_LEVELS, info.level_count) - 1);
     this.root();
-    if (this.#drawsSurface() && source.size > LARGE_FILE)
-      source.stop?.(); // most of the response would be envelopes
     await this.file.locate();
     if (!this.ended)
       post(this.slot, { type: 'located', opening: this.number, bytesTo: this.file.levelBytes, traffic: this.file.traffic });

@@ -173,6 +173,20 @@ test('requests beyond the first response fetch only missing bytes', () => serve(
   assert.deepEqual(requested, [[0, part - 1], [part, part + 15], [part + 30, part + 49]]);
 }));
 
+test('the first response of a large file is ended, and continued when more is needed', () => serve(undefined, async (url, requested) => {
+  const source = new UrlSource(url, { ahead: 1 << 20, enoughOf: (size) => (size === bytes.length ? 200 : Infinity) });
+  await source.open(100);
+  source.extend(part);
+  assert.deepEqual(Buffer.from(await source.read(195, 10)), bytes.subarray(195, 205));
+  await source.read(0, part);
+  await new Promise((done) => setTimeout(done, 100)); // the transfer ends
+  source.extend(part - 1); // which it has
+  source.extend(2 * bytes.length);
+  assert.equal(source.coming, bytes.length);
+  assert.deepEqual(Buffer.from(await source.read(part - 5, 10)), bytes.subarray(part - 5, part + 5));
+  assert.deepEqual(requested, [[0, bytes.length - 1], [200, part - 1], [part, bytes.length - 1]]);
+}));
+
 // Each response ends after 300 bytes until `broken` is 0.
 const breaking = (broken) => (reply, n, response) => {
   if (--broken < 0)
