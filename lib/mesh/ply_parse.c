@@ -75,7 +75,11 @@ static ebpo_status check_counts(const ebpo_ply_parser *p)
                               "%" PRIu64 " vertices and %" PRIu64
                               " faces, but the limit is 2^32 - 2 of each; split the model",
                               vertices, faces);
-    if (!faces && (h->strips < 0 || !h->element[h->strips].count))
+    bool has_faces = faces || (h->strips >= 0 && h->element[h->strips].count);
+    if (!has_faces && !vertices)
+        return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
+                              "the mesh is empty, with neither vertices nor faces");
+    if (!has_faces)
         return ebpo_fail_file(p->error, EBPO_E_FORMAT, p->name,
                               "has %" PRIu64
                               " vertices but no faces (a point cloud); reconstruct a surface "

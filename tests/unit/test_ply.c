@@ -373,6 +373,7 @@ static const struct {
       "3 vertices but no faces (a point cloud" },
     { POINTS(3) FACES(0) "0 0 0\n1 0 0\n0 1 0\n", EBPO_E_FORMAT,
       "3 vertices but no faces (a point cloud" },
+    { POINTS(0) FACES(0), EBPO_E_FORMAT, "the mesh is empty, with neither vertices nor faces" },
     { POINTS(1000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT,
       "line 3: 1000000000000 rows of element 'vertex' do not fit into the rest of the file" },
     { POINTS(10000000000000000000) FACES(1) "0 0 0\n", EBPO_E_FORMAT,

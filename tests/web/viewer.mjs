@@ -41,6 +41,7 @@ function makeModels() {
   writeFileSync(join(work, 'red.ply'), `ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nelement face 6\n` +
     `property list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n${corners.join('\n')}\n${sides.map((s) => `4 ${s} 255 0 0\n`).join('')}`);
   run(ebpo, ['convert', '-q', join(work, 'red.ply'), join(models, 'red.ebpo.h5')]);
+  run(ebpo, ['boolean', 'A - B', join(models, 'red.ebpo.h5'), join(models, 'red.ebpo.h5'), '--pose', 'B 0.4 0.4 0.4', '--operand-colours', '-o', join(models, 'notch.ebpo.h5')]);
   const damaged = Buffer.from(readFileSync(model));
   damaged[damaged.length >> 1] ^= 1;
   writeFileSync(join(models, 'damaged.ebpo.h5'), damaged);
@@ -63,7 +64,7 @@ async function serve(...options) {
   const server = spawn('sh', [join(root, 'samples/serve.sh'), '--port', String(port), '--folder', models, '--log', log, ...options], { stdio: 'inherit' });
   cleanup.push(() => new Promise((done) => server.once('exit', done).kill('SIGTERM')));
   const address = `http://localhost:${port}/`;
-  for (let i = 0; i < 100; i++) {
+  for (let i = 0; i < 600; i++) { // up to a minute on a busy machine
     if (await fetch(address).then((r) => r.ok, () => false))
       return address;
     await new Promise((done) => setTimeout(done, 100));
@@ -136,8 +137,8 @@ async function silhouette(page) {
   return box;
 }
 
-// Compares screenshots with and without the model, both without panels. Returns the bounds of the differing pixels, their share of the page, their mean colour and
-// the number of their colours. The page decodes the PNG.
+// Compares screenshots with and without the model, both without panels. Returns the bounds of the differing pixels, their share of the page, their mean colour,
+// the number of their colours, and the share of orange ones among them. The page decodes the PNG.
 async function look(page, hidden = '#panel, #bar, #tools, #progress, #compass, #scale { visibility: hidden; }') {
   const hide = await page.addStyleTag({ content: hidden });
   const shot = async () => (await page.screenshot()).toString('base64');
@@ -152,7 +153,7 @@ async function look(page, hidden = '#panel, #bar, #tools, #progress, #compass, #
       return context.getImageData(0, 0, image.width, image.height);
     }));
     const box = [Infinity, Infinity, -Infinity, -Infinity], colour = [0, 0, 0], shades = new Set();
-    let count = 0;
+    let count = 0, orange = 0;
     for (let i = 0; i < a.data.length; i += 4) {
       const difference = Math.abs(a.data[i] - b.data[i]) + Math.abs(a.data[i + 1] - b.data[i + 1]) + Math.abs(a.data[i + 2] - b.data[i + 2]);
       if (difference < 24)
@@ -163,11 +164,12 @@ async function look(page, hidden = '#panel, #bar, #tools, #progress, #compass, #
       box[2] = Math.max(box[2], x + 1);
       box[3] = Math.max(box[3], y + 1);
       count++;
+      orange += a.data[i] > 2 * a.data[i + 2];
       for (let k = 0; k < 3; k++)
         colour[k] += a.data[i + k];
       shades.add(a.data[i] << 16 | a.data[i + 1] << 8 | a.data[i + 2]);
     }
-    return { box, share: count / (a.width * a.height), colour: colour.map((c) => c / count), shades: shades.size };
+    return { box, share: count / (a.width * a.height), colour: colour.map((c) => c / count), shades: shades.size, orange: orange / count };
   }, [withModel, without]);
 }
 
@@ -260,6 +262,17 @@ async function modelColours(browser, address, plainPage) {
   const [red, green, blue] = await colour();
   assert.ok(Math.abs(red - green) < 25 && Math.abs(red - blue) < 40, `${[red, green, blue]} is not gray`);
   assert.ok(await page.isVisible('#ownRow') && !await plainPage.isVisible('#ownRow'));
+  await page.close();
+}
+
+// Opens a box without its corner. Faces of the corner are those of operand B, whose colour is orange; all others have the colour of operand A, which is nearly gray.
+async function operandColours(browser, address) {
+  const page = await show(browser, `${address}?file=models/notch.ebpo.h5&view=35,30,4&detail=0`);
+  await settled(page);
+  const { orange } = await look(page);
+  assert.ok(orange > 0.15 && orange < 0.6, `${orange} of the picture is orange`);
+  await page.keyboard.press('m');
+  assert.equal((await look(page)).orange, 0, 'without colours');
   await page.close();
 }
 
@@ -1098,6 +1111,7 @@ async function main() {
   await step('point queries agree with the library', () => point(page));
   await step('a click queries the visible point', () => click(page));
   await step('faces have the model\'s colours, with a switch', () => modelColours(browser, address, page));
+  await step('a Boolean result has the colours of its operands', () => operandColours(browser, address));
   requests();
   await step('a file from disk is shown without a server', () => fromDisk(page));
   await page.close();
