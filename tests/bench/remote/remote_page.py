@@ -151,7 +151,7 @@ def query_table(page, found):
               f"*Near* points are at most {url_queries.NEAR:g} diagonals from the surface, at positions where "
               f"random lines enter the model. The commands are `ebpo distance` and `ebpo inside "
               f"--memory {url_queries.BUDGET} URL POINTS`, `ebpo ray`, `ebpo fetch -q --box`, `ebpo levels --max-level` and `ebpo "
-              "view --seen-only --pixels 16`. Queries that meet all goals are in the table above.")
+              "view --seen-only --pixels 16`.")
     page.table(["query", "round trips", "requests", "bytes", "s"],
                [[row["what"],
                  *(middle(found.values(AFTER, name, what))
@@ -222,7 +222,7 @@ def made(results, command, programs, note):
               f"Made by `{command}`; {programs} with its zstd plugin, HDF5's ros3 driver through "
               f"Debian's h5py with our plugin, all on one machine: {measured.machine()}; load "
               f"average {figure(statistics.median(load))} (median), {figure(max(load))} (maximum). "
-              "Requests, bytes and round trips are exact; compare times roughly.", "",
+              "Requests and bytes are exact; compare times roughly.", "",
               "Large model: `ebpo-generate --base lucy100k.ply --subdivide 4 lucy28.ply` "
               "(25,592,320 faces). Small model: `ebpo-generate --base igea.ply --subdivide 2 "
               "igea4.ply` (4,298,976 faces).")
