@@ -10,7 +10,7 @@ import { $, state, toScene, upright } from '../state.js';
 const FULL_SIZE = 32768, AT_ONCE = 200, NEAR_PIXELS = 24; // NEAR_PIXELS: between a face and an envelope that is drawn for it
 const HTML = `${ROWS}<p class="hint" id="paintText" role="status"></p><div class="buttons"><button id="layerAdd" class="small">Add a layer</button></div>`;
 
-/** Returns { begin(command), receive(news), warmUp() } for live.js. */
+/** Returns { begin(command), receive(news), warmUp() } for live.js, and draw(), to be called when other instances are visible. */
 export function addPainted({ scene, assembly, pipeline }) {
   const decals = pipeline.layers = new Decals(kit), paints = new Map(), reaches = new WeakMap(); // { layers, strokes } by a model's name; { normal, faces } by a point
   const made = new Map(); // WeakMaps for splitStroke() by an instance
