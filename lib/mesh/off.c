@@ -122,8 +122,8 @@ typedef struct off_reading {
     bool not_bytes;        /* a colour is not an integer from 0 to 255 */
     float greatest_colour; /* greatest colour value */
     /* numbers of: vertices with values that the header does not declare; faces with values that are
-     * no colour; faces with an index of a colour */
-    uint64_t surplus_vertices, surplus_faces, indexed;
+     * no colour; faces with an index of a colour; faces without a colour */
+    uint64_t surplus_vertices, surplus_faces, indexed, uncoloured;
     uint64_t divided; /* number of vertices with a weight other than 1 */
     /* alpha: a colour has an opacity. both: both vertices and faces have colours. more: text
      * follows the last face */
@@ -416,8 +416,10 @@ static ebpo_status keep_face(off_reading *r, uint32_t *row)
     *row = EBPO_IMPORT_NONE;
     r->indexed += r->rest_count == 1;
     r->surplus_faces += r->rest_count == 2 || r->rest_count > 4;
-    if (r->rest_count != 3 && r->rest_count != 4)
+    if (r->rest_count != 3 && r->rest_count != 4) {
+        r->uncoloured++;
         return EBPO_OK;
+    }
     if (r->colours) {
         r->both = true;
         return EBPO_OK;
@@ -510,6 +512,9 @@ static void record_losses(const off_reading *r, ebpo_attributes *to)
         ebpo_attributes_lose(to, "opacity of colours");
     if (r->both)
         ebpo_attributes_lose(to, "colours of faces (vertices also have colours)");
+    if (r->uncoloured && r->build->table[EBPO_IMPORT_COLOURS].of_face)
+        ebpo_attributes_lose(to, "missing colours of faces (stored as black): %" PRIu64,
+                             r->uncoloured);
     if (r->indexed)
         ebpo_attributes_lose(to, "colours of faces that are indices into a table");
 }

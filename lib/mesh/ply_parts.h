@@ -125,11 +125,11 @@ typedef struct ebpo_ply_parser {
     bool strict;        /* ascii: surplus values are an error; coordinates are doubles */
     double max_rounded; /* ascii: largest rounding error of a float coordinate */
     uint64_t rounded;   /* ascii: number of attribute values whose text a float cannot hold */
-    bool *lost; /* [attribute arrays] true if a value does not fit its type; NULL: attributes are
-                 * not read */
+    /* [attribute arrays] true if the mesh will not have the array, for example because a value does
+     * not fit its type; NULL: attributes are not read */
+    bool *lost;
     uint64_t faces_reserved; /* rows reserved for face attributes */
-    uint64_t
-        repeated_bytes; /* bytes of lists that were copied to the other triangles of polygons */
+    uint64_t repeated_bytes; /* bytes of copies of lists for the other triangles of polygons */
     ebpo_error *error;
 } ebpo_ply_parser;
 

@@ -201,6 +201,7 @@ START_TEST(test_import_off_face_colours)
     static const uint8_t bytes[] = { 0, 0, 0, 0, 0, 0, 0, 0, 0, 255, 0, 9 };
     import_off("", "", "255 0 9");
     expect_bytes(find("face", "red green blue"), bytes, 12);
+    ck_assert_str_eq(mesh.attributes->lost, "missing colours of faces (stored as black): 3");
     ebpo_mesh_free(&mesh);
     import_off("", "", "7");
     ck_assert_str_eq(mesh.attributes->lost, "colours of faces that are indices into a table");
