@@ -169,7 +169,7 @@ typedef struct ebpo_export_report {
 /*
  * Gets the name of the second file that ebpo_export writes besides `path`; "" if the format has no
  * second file. The name is stored in `out`, which has `space` bytes. Returns false if the name does
- * not fit, or if the format does not support the name (XDMF: a name with ":").
+ * not fit, or if the format does not support the name (XDMF: ":" in the name; glTF: ".bin" at end).
  *
  * Threads: any.
  */
