@@ -82,7 +82,8 @@ bool ebpo_export_second_file(ebpo_export_format format, const char *path, char *
                           row->second_ending);
     else /* readers take the text after the first ":" as the path within the HDF5 file */
         length = strchr(name, ':') ? -1 : snprintf(out, capacity, "%s%s", path, row->second_ending);
-    return length >= 0 && (size_t)length < capacity;
+    /* With the ending of the second file, both files would have the same name. */
+    return length >= 0 && (size_t)length < capacity && strcmp(out, path) != 0;
 }
 
 static ebpo_status check_export(const ebpo_info *info, const ebpo_export_row *row,
@@ -164,8 +165,8 @@ ebpo_status ebpo_export(const ebpo_file *file, const char *path, ebpo_export_for
         return status;
     if (!ebpo_export_second_file(format, path, second, sizeof second))
         return ebpo_fail_file(error, EBPO_E_ARGUMENT, path,
-                              "cannot be used with this format: the name is too long or contains "
-                              "a ':'; choose another name");
+                              "cannot be used with this format: the name is too long, contains a "
+                              "':' or is that of the second file; choose another name");
     if (wanted.first_level <= wanted.last_level && !wanted.surface && !(row && row->folder))
         ebpo_file_prefetch_levels(file, 0, wanted.last_level);
     status =

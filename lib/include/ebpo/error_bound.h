@@ -32,8 +32,8 @@ typedef struct ebpo_error_bound_options {
 
     /*
      * Refining stops, with the bounds known so far, when about this many distances have been
-     * computed. At least two and at most 65,536 distances are computed for each node. 0: the level
-     * has no limit.
+     * computed. At least two distances are computed for each node. 0: the level has no limit, but
+     * at most 65,536 distances are computed for each node.
      */
     uint64_t queries;
 

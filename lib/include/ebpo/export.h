@@ -32,7 +32,7 @@ typedef enum ebpo_export_format {
      */
     EBPO_EXPORT_GLTF,
     EBPO_EXPORT_GLB, /* glTF 2.0 in one file */
-    EBPO_EXPORT_OBJ, /* written by assimp, without a material library */
+    EBPO_EXPORT_OBJ, /* by assimp: equal vertices become one, in the order of their first use */
     EBPO_EXPORT_STL, /* written by assimp, binary; only one level, or the mesh */
 
     /*
@@ -119,7 +119,7 @@ typedef struct ebpo_export_block {
     int level;                    /* -1: the mesh */
     uint64_t nodes;               /* number of polyhedra; 0 for the mesh */
     uint64_t polygons;            /* number of polygons; for the mesh, number of triangles */
-    uint64_t triangles, vertices; /* numbers of triangles and vertices in the exported file */
+    uint64_t triangles, vertices; /* in the file; in OBJ, before equal vertices are joined */
     double volume;                /* volume of the envelopes; 0 for the mesh */
 } ebpo_export_block;
 
@@ -169,7 +169,7 @@ typedef struct ebpo_export_report {
 /*
  * Gets the name of the second file that ebpo_export writes besides `path`; "" if the format has no
  * second file. The name is stored in `out`, which has `space` bytes. Returns false if the name does
- * not fit, or if the format does not support the name (XDMF: a name with ":").
+ * not fit, or if the format does not support the name (XDMF: ":" in the name; glTF: ".bin" at end).
  *
  * Threads: any.
  */

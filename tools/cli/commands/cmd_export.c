@@ -271,9 +271,10 @@ static int run_export(void *given, const char **operand)
     if (code != EXIT_OK)
         return code;
     if (!ebpo_export_second_file((ebpo_export_format)v->format, operand[1], second, sizeof second))
-        return command_usage(
-            "export",
-            "the output's name is too long, or contains a ':', which XDMF does not allow");
+        return command_usage("export",
+                             "the output's name is too long, contains a ':', which XDMF does not "
+                             "allow, or ends with "
+                             ".bin, as the second file of glTF does; choose another name");
     code = check_names(operand[0], operand[1], second);
     if (code != EXIT_OK)
         return code;

@@ -245,16 +245,17 @@ static ebpo_status draw_legend(const map_job *j, picture *p, int x, bool has_sig
     return status;
 }
 
+/* Returns true if one value is below 0 and the other above 0. The product of the values does not
+ * show this, because it may underflow. */
+static bool differ_in_sign(double a, double b) { return (a < 0 && b > 0) || (a > 0 && b < 0); }
+
 /* Returns true if the surface is at the pixel (x, y). The value of this pixel is then 0, or differs
  * in sign from the value of the next pixel in x or y. */
 static bool on_surface(const double *values, int width, int height, int x, int y)
 {
-    double value = values[(size_t)y * (size_t)width + (size_t)x];
-    if (value == 0)
-        return true;
-    if (x + 1 < width && value * values[(size_t)y * (size_t)width + (size_t)x + 1] < 0)
-        return true;
-    return y + 1 < height && value * values[(size_t)(y + 1) * (size_t)width + (size_t)x] < 0;
+    const double *value = values + (size_t)y * (size_t)width + (size_t)x;
+    return *value == 0 || (x + 1 < width && differ_in_sign(*value, value[1])) ||
+           (y + 1 < height && differ_in_sign(*value, value[width]));
 }
 
 /* Returns true if the colours show the signs of distances. */

@@ -134,13 +134,14 @@ static bool has_inside(const ebpo_info *info)
  * holes of a surface; a hole can be closed by different caps. */
 static void print_caps(const ebpo_info *info, const ebpo_mass *mass)
 {
-    char unit[TABLE_CELL], share[TABLE_CELL];
+    char unit[2][TABLE_CELL], share[TABLE_CELL];
     double percent = 100 * mass->caps_integral / fabs(mass->integral);
     printf("  caps      the error of the integral is at most %.2g; the choice of caps in the hulls "
            "of\n"
            "            their loops changes it by at most %.6g%s (%s %%), the centroid by %.6g%s\n",
-           mass->integral_error, mass->caps_integral, table_unit(unit, info->unit, 3),
-           table_cell(share, "%.3g", percent), mass->caps_centroid, info->unit[0] ? " " : "");
+           mass->integral_error, mass->caps_integral, table_unit(unit[0], info->unit, 3),
+           table_cell(share, "%.3g", percent), mass->caps_centroid,
+           table_unit(unit[1], info->unit, 1));
 }
 
 static void print_mass(const char *path, const ebpo_info *info, const ebpo_mass *mass,
@@ -352,6 +353,9 @@ static const values standard = { .tolerance = 0.05,
 static int run_measure(void *given, const char **operand)
 {
     values *v = given;
+    if (!v->error_bound && (v->tolerance != standard.tolerance || v->queries != standard.queries))
+        return command_usage("measure",
+                             "--tolerance and --max-queries apply to --error-bound only; add it");
     if (!process_memory_take("measure", v->memory, v->threads))
         return EXIT_USAGE;
     return command_requires_hdf5("measure", operand[0]) ? measure_file(operand[0], v) : EXIT_FAILED;

@@ -155,10 +155,14 @@ ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info, cons
                  words_parts(parts, sizeof parts, requested & ~info->parts));
         return refuse_values(error, shown, what);
     }
-    if (named && out->parts & EBPO_PART_MAPS && !(out->parts & EBPO_PART_MESH))
-        return refuse_values(error, shown,
-                             "--parts requests maps without the mesh, whose faces and vertices "
-                             "they number; add mesh");
+    uint32_t of_mesh = EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_BORDER;
+    if (named && out->parts & of_mesh && !(out->parts & EBPO_PART_MESH)) {
+        char parts[80];
+        snprintf(what, sizeof what,
+                 "--parts requests %s without the mesh, to which they belong; add mesh",
+                 words_parts(parts, sizeof parts, out->parts & of_mesh));
+        return refuse_values(error, shown, what);
+    }
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&
         out->last_level < info->level_count - 1)
         out->parts &= ~(uint32_t)(EBPO_PART_MESH | EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES);
