@@ -72,18 +72,19 @@ static ebpo_status join_caps(ebpo_mesh *out, const ebpo_mesh *mesh, const ebpo_b
                               "with its caps, the mesh has more than 2^32 - 2 vertices or faces");
     out->vertex_count = vertices + loops->point_count;
     out->face_count = faces + caps;
-    size_t size = 3 * (mesh->xyz64 ? sizeof(double) : sizeof(float));
+    bool doubles = mesh->xyz64 || (!mesh->xyz32 && file->info.double_coordinates);
+    size_t size = 3 * (doubles ? sizeof(double) : sizeof(float));
     void *points = ebpo_array_alloc(w, out->vertex_count, size);
     out->faces = ebpo_array_alloc(w, out->face_count, 3 * sizeof *out->faces);
-    out->xyz64 = mesh->xyz64 ? points : NULL;
-    out->xyz32 = mesh->xyz64 ? NULL : points;
+    out->xyz64 = doubles ? points : NULL;
+    out->xyz32 = doubles ? NULL : points;
     if (!points || !out->faces) {
         ebpo_mesh_free(out);
         return ebpo_workspace_fail(
             w, out->vertex_count * size + out->face_count * 3 * sizeof *out->faces, error);
     }
     if (vertices)
-        ebpo_array_copy(w, points, mesh->xyz64 ? (const void *)mesh->xyz64 : mesh->xyz32,
+        ebpo_array_copy(w, points, doubles ? (const void *)mesh->xyz64 : mesh->xyz32,
                         vertices * size);
     if (faces)
         ebpo_array_copy(w, out->faces, mesh->faces, faces * 3 * sizeof *out->faces);

@@ -407,7 +407,7 @@ static ebpo_status call_add_border(every_call_env *e)
     ebpo_read_options read = EBPO_READ_OPTIONS_INIT;
     ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
     ebpo_file *file = NULL, *whole = NULL;
-    ebpo_mesh mesh = { 0 };
+    ebpo_mesh mesh = { 0 }, caps = { 0 };
     read.threads = write.threads = 1;
     read.workspace = e->workspace;
     ebpo_status status = ebpo_open(scratch(EVERY_CALL_SURFACE), &file, e->error);
@@ -421,7 +421,10 @@ static ebpo_status call_add_border(every_call_env *e)
         status = ebpo_file_read_mesh(whole, &read, &mesh, e->error);
     if (status == EBPO_OK)
         status = ebpo_mesh_add_caps(&mesh, whole, e->error);
+    if (status == EBPO_OK)
+        status = ebpo_mesh_add_caps(&caps, whole, e->error);
     ebpo_mesh_free(&mesh);
+    ebpo_mesh_free(&caps);
     ebpo_close(whole);
     ebpo_close(file);
     return status;
