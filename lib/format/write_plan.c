@@ -559,20 +559,19 @@ static ebpo_status check_tree(ebpo_plan *plan, const ebpo_check *check, ebpo_err
     return status;
 }
 
-/* Computes the volumes of envelopes if planes of the tree are not written. */
-static void measure_levels(ebpo_plan *plan)
+/* Computes the volumes of leaves' envelopes if planes of leaves are in the tree, but are not
+ * written. (Volumes are kept if the planes of gray nodes are not written either: the test vectors
+ * have files of this kind.) */
+static void measure_leaves(ebpo_plan *plan)
 {
     double gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
     ebpo_info *info = &plan->info;
     uint32_t lost = plan->tree->info.parts & ~info->parts;
-    if (!(lost & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)))
+    if ((lost & (EBPO_PART_PLANES | EBPO_PART_LEAF_PLANES)) != EBPO_PART_LEAF_PLANES)
         return;
     ebpo_tree_volumes(plan->tree, info->parts, gray, leaf);
-    for (int i = 0; i < info->level_count; i++) {
-        if (lost & EBPO_PART_PLANES)
-            info->level[i].gray_volume = gray[i];
+    for (int i = 0; i < info->level_count; i++)
         info->level[i].leaf_volume = leaf[i];
-    }
 }
 
 static ebpo_status index_levels(ebpo_plan *plan, ebpo_error *error)
@@ -729,7 +728,7 @@ ebpo_status ebpo_plan_make(ebpo_plan *plan, const ebpo_tree *tree,
     if (status == EBPO_OK)
         status = check_tree(plan, &check, error);
     if (status == EBPO_OK)
-        measure_levels(plan);
+        measure_leaves(plan);
     if (status == EBPO_OK)
         status = index_levels(plan, error);
     if (status == EBPO_OK && plan->info.parts & EBPO_PART_MESH)
