@@ -1,6 +1,8 @@
 /* Closes the holes of a surface's mesh by caps: triangles over the points of the border's loops.
  * The caps get separate vertices, because the file stores positions of the border, not indices of
  * vertices. Source: format-spec/border.md. */
+#include "core/strict_fp.h"
+
 #include <stdlib.h>
 #include <string.h>
 
