@@ -371,7 +371,8 @@ def test_full_disk(t, recovers):
     device.send((0, 0, 0), kind=3)
     out, err = p.communicate(timeout=60)
     got = json.loads(out)
-    check(got["paint"]["failed_saves"] > 0 and got["haptic"]["steps"] > 2000, got["paint"], got["haptic"]["steps"])
+    # The first save fails after a second, or 1,000 steps; a busy machine omits some of the 2,200 steps.
+    check(got["paint"]["failed_saves"] > 0 and got["haptic"]["steps"] > 1200, got["paint"], got["haptic"]["steps"])
     check(err.count("the device continues") == 1 and ("saved again" in err) == recovers, err)
     check(p.returncode == (0 if recovers else 1) and ("failure" in got["paint"]) != recovers, p.returncode, err)
     check(("the paint since the last save is lost" in err) != recovers, err)
