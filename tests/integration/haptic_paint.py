@@ -244,17 +244,23 @@ def test_stylus(t):
     replay(t, paint, t.at("stylus.path"), *more)
 
 
-def test_unplugged(t):
-    """A device whose positions are missing for a time does not paint along the way to its next position."""
-    paint = t.at("unplugged.paint.h5")
+def test_unplugged(t, stopped):
+    """A device whose positions are missing for a time does not paint along the way to its next position.
+    stopped: neither if the loop is stopped meanwhile."""
+    paint = t.at(f"unplugged-{stopped}.paint.h5")
     p = t.start(paint, "--device", "udp:0", "--seconds", "3")
     device = Device(p)
     device.draw(p, 0.4)
+    time.sleep(0.1)
+    if stopped:
+        p.send_signal(signal.SIGSTOP)
     time.sleep(0.4)
     for x in (0.7, 0.72, 0.74, 0.76):
-        for _ in range(20):
+        for n in range(20):
             device.send((x, 0.5, 0.98))
             time.sleep(0.002)
+            if n == 1:
+                p.send_signal(signal.SIGCONT)
     device.send((0, 0, 0), kind=3)
     out, err = p.communicate(timeout=60)
     strokes = [[q["place"][0] for q in s["points"]] for s in t.strokes(paint)]
@@ -480,7 +486,8 @@ def main(ebpo, generate, faults=None):
         test_replay(t)
         test_erase(t)  # of the strokes that test_replay has painted
         others = (test_rough_surface, lambda _: test_full_disk(t, True), lambda _: test_full_disk(t, False),
-                  lambda _: test_kill(t, faults), test_second_writer, test_stylus, test_lifted_pen, test_unplugged,
+                  lambda _: test_kill(t, faults), test_second_writer, test_stylus, test_lifted_pen,
+                  lambda _: test_unplugged(t, False), lambda _: test_unplugged(t, True),
                   test_saved_elsewhere, test_view, test_probe, test_brush, test_corner, test_deeper, test_gap)
         if faults:
             others += (lambda _: test_sync_failures(t, faults),)

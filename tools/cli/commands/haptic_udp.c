@@ -9,7 +9,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef __linux__
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
+#endif
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "cli/tool_clock.h"
@@ -42,6 +47,7 @@ typedef struct udp {
     struct sockaddr_in device; /* address of the device */
     uint64_t sequence, tag;    /* from the last valid packet; each feedback repeats both numbers */
     uint64_t arrived;          /* tool_clock at the last valid packet */
+    uint64_t received;         /* received_at of this packet */
     bool follows;              /* no silence since the proxy was last not behind the device */
     uint64_t ignored;          /* number of invalid packets */
     haptic_pose pose;          /* the last position */
@@ -146,7 +152,23 @@ static bool take_packet(udp *u, const uint8_t *p, ssize_t size, const struct soc
     return true;
 }
 
-/* Processes the packets that have arrived; does not wait. */
+/* Returns the system's time in nanoseconds at which it received the packet that was read last, or 0
+ * if it is not known. A delayed loop reads packets late. The first call lets the system note the
+ * times of later packets. */
+static uint64_t received_at(int socket)
+{
+#ifdef SIOCGSTAMPNS
+    struct timespec at;
+    if (ioctl(socket, SIOCGSTAMPNS, &at) == 0)
+        return (uint64_t)at.tv_sec * 1000000000 + (uint64_t)at.tv_nsec;
+#else
+    (void)socket;
+#endif
+    return 0;
+}
+
+/* Processes the packets that have arrived; does not wait. Lifts the pen if the device was silent
+ * before one of them. */
 static void take_all(udp *u)
 {
     uint8_t bytes[PRESSURE_BYTES + 1];
@@ -158,8 +180,15 @@ static void take_all(udp *u)
         /* ECONNREFUSED: an earlier feedback did not reach the device, but the device may return */
         if (size < 0 && errno != ECONNREFUSED)
             return;
-        if (size >= 0 && !(length == sizeof from && take_packet(u, bytes, size, &from)))
+        if (size < 0)
+            continue;
+        uint64_t received = received_at(u->socket);
+        if (length != sizeof from || !take_packet(u, bytes, size, &from)) {
             u->ignored++;
+            continue;
+        }
+        u->follows &= !(u->received && received >= u->received + SILENCE_NS);
+        u->received = received;
     }
 }
 
@@ -289,5 +318,6 @@ bool haptic_udp_open(haptic_device *out, const char *name)
         fprintf(stderr, "ebpo haptic: %s: %s\n", name, strerror(errno));
         return false;
     }
+    (void)received_at(u->socket);
     return true;
 }
