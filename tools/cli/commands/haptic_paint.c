@@ -52,7 +52,8 @@ static const double SHORTEST_STEP = 1e-5;
 /* Seconds to wait for another program that changes the file. */
 static const double LOCK_SECONDS = 1;
 
-/* The pen is lifted when it was not in contact for this time. Shorter gaps do not end a stroke. */
+/* The pen is lifted when it was not in contact for this time. Shorter gaps do not end a stroke,
+ * unless the device lifts the pen. */
 static const double LIFT_MS = 30;
 
 /* A contact of this run. */
@@ -572,7 +573,7 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
     ebpo_paint_input input[SLICE + 1];
     uint64_t taken = 0, n = 0;
     bool touches = is_touching(&samples[0]);
-    if (samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS)) {
+    if (samples[0].lifted || samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS)) {
         lift_pen(p);
         p->undone = false;
     }
