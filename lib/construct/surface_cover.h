@@ -39,7 +39,7 @@ bool ebpo_cover_make(ebpo_cover *cover, const ebpo_patch_mesh *surface);
 void ebpo_cover_free(ebpo_cover *cover);
 
 /* Returns an upper bound of the distance of the points of a triangle from the surface. Returns
- * INFINITY if no covering was found. `p`: its corners, of at most 4 in absolute value. `guess`:
+ * INFINITY if no covering was found. `p`: its corners, of at most 2 in absolute value. `guess`:
  * triangles of the surface that are probably near, or UINT64_MAX; the best guess is the last one.
  * Bounds of at most `least` need not be close to the distance. Sets *near to a triangle of the
  * surface, and `far` to a point whose distance is probably near the bound, unless the result is

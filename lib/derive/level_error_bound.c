@@ -470,7 +470,7 @@ static bool has_used_up_queries(const survey *s, const ebpo_error_bound_options 
     if (out->hi <= (1 + o->tolerance) * out->lo)
         return false;
     bool queries_used_up = o->queries && out->queries >= o->queries;
-    for (uint64_t i = 0; i < s->count && !queries_used_up; i++)
+    for (uint64_t i = 0; i < s->count && !o->queries && !queries_used_up; i++)
         queries_used_up = s->nodes[i].bound.queries >= QUERIES_MAX;
     return queries_used_up;
 }

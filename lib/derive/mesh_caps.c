@@ -54,6 +54,7 @@ static void write_caps(ebpo_mesh *out, const ebpo_mesh *mesh, const ebpo_border_
         uint32_t points = loops->loop[2 * i];
         to = write_stretch(to, first, 0, points - 1, loops->loop[2 * i + 1]);
         first += points;
+        ebpo_release_pages(out->workspace);
     }
 }
 

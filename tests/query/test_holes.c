@@ -440,8 +440,6 @@ static void check_same_files(const char *one, const char *other)
     fclose(b);
 }
 
-/* The border that is added to a file equals the border that is built, except for envelopes: those
- * of a built surface contain its inside. */
 /* Stops when winding numbers of nodes are computed, which is the only stage "border" of a repack.
  */
 static bool stop_windings(void *user, const char *stage, uint64_t done, uint64_t total)
@@ -450,6 +448,8 @@ static bool stop_windings(void *user, const char *stage, uint64_t done, uint64_t
     return strcmp(stage, "border") != 0 || done == total;
 }
 
+/* The border that is added to a file equals the border that is built, except for envelopes: those
+ * of a built surface contain its inside. */
 START_TEST(test_border_is_added_to_file)
 {
     uint64_t state = 4, seed = 4;

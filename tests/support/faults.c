@@ -141,8 +141,8 @@ static module_kind behind(void)
 }
 
 /* Returns true if no call from this place has failed, and records the place: the kind of the call,
- * and the innermost functions of this project that lead to it. */
-static bool is_new_place(unsigned kind)
+ * and the innermost functions of this project that lead to it. *at: its entry in the table. */
+static bool is_new_place(unsigned kind, _Atomic uint64_t **at)
 {
     enum { DEPTH = 16, FUNCTIONS = 3 };
     void *frame[DEPTH];
@@ -159,7 +159,8 @@ static bool is_new_place(unsigned kind)
     hash |= 1;
     for (uint64_t i = hash >> 20, tries = 0; tries < PLACES; i++, tries++) {
         uint64_t found = 0;
-        if (atomic_compare_exchange_strong(&places[i % PLACES], &found, hash))
+        *at = &places[i % PLACES];
+        if (atomic_compare_exchange_strong(*at, &found, hash))
             return true;
         if (found == hash)
             return false;
@@ -178,9 +179,13 @@ static bool fails(unsigned kind, const void *caller)
         return false;
     uint64_t n = atomic_fetch_add(&counts[0], 1) + 1;
     uint64_t first = atomic_load(&failing);
-    if (first == FAULTS_NEW_PLACE && is_new_place(kind) &&
-        atomic_compare_exchange_strong(&failing, &first, n))
-        first = n;
+    _Atomic uint64_t *place;
+    if (first == FAULTS_NEW_PLACE && is_new_place(kind, &place)) {
+        if (atomic_compare_exchange_strong(&failing, &first, n))
+            first = n;
+        else
+            atomic_store(place, 0); /* another thread was first, so this place does not fail */
+    }
     bool now = first && (n == first || (onward && n > first));
     if (now) {
         atomic_fetch_add(&counts[1], 1);

@@ -344,9 +344,9 @@ typedef struct ebpo_haptic_probe_result {
  * distance from `position` to the model. The bounds combine three sources in memory:
  * - The near faces, and the sides of these faces on which the probe is. Exact arithmetic tracks
  *   these sides. Within `search_radius` of a face, the result is exact except for rounding.
- * - The first levels of the octree, at most 2^17 nodes of all models together. Leaves and gray
- *   nodes (nodes with children) bound the distance. White nodes (outside the solid) and black nodes
- *   (inside) give the side.
+ * - The first levels of the octree, at most 2^17 nodes of all models together besides their roots.
+ *   Leaves and gray nodes (nodes with children) bound the distance. White nodes (outside the solid)
+ *   and black nodes (inside) give the side.
  * - The exact result for an earlier position of the probe, which the loading thread computes. Since
  *   then, the distance has changed by at most the length of the probe's path.
  *

@@ -52,10 +52,6 @@ static const double SHORTEST_STEP = 1e-5;
 /* Seconds to wait for another program that changes the file. */
 static const double LOCK_SECONDS = 1;
 
-/* The pen is lifted when it was not in contact for this time. Shorter gaps do not end a stroke,
- * unless the device lifts the pen. */
-static const double LIFT_MS = 30;
-
 /* A contact of this run. */
 typedef struct haptic_contact {
     uint64_t strokes; /* number of strokes of `drawn` before the contact */
@@ -573,7 +569,8 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
     ebpo_paint_input input[SLICE + 1];
     uint64_t taken = 0, n = 0;
     bool touches = is_touching(&samples[0]);
-    if (samples[0].lifted || samples[0].time - p->touched > (touches ? p->lost_ms : LIFT_MS)) {
+    if (samples[0].lifted ||
+        samples[0].time - p->touched > (touches ? p->lost_ms : HAPTIC_LIFT_MS)) {
         lift_pen(p);
         p->undone = false;
     }
@@ -939,7 +936,7 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
     pthread_mutex_init(&p->lock, NULL);
     p->pen = *pen;
     p->instance = UINT64_MAX;
-    p->lost_ms = fmax(LIFT_MS, 1500 / pen->rate);
+    p->lost_ms = fmax(HAPTIC_LIFT_MS, 1500 / pen->rate);
     for (uint64_t i = 0; i < pen->point_count; i++)
         p->arm =
             fmax(p->arm, hypot(hypot(pen->points[i][0], pen->points[i][1]), pen->points[i][2]));

@@ -9,6 +9,10 @@
 
 #include "cli/commands/haptic_live.h"
 
+/* The pen is lifted when it was not in contact for this time. Shorter gaps do not end a stroke,
+ * unless the device lifts the pen. */
+enum { HAPTIC_LIFT_MS = 30 };
+
 /* The pen. Its pressure is that of the device's stylus or, without one, the force of the spring
  * divided by full_force, at most 1. Its lengths are in the unit of the world. */
 typedef struct haptic_pen {

@@ -1,12 +1,16 @@
 #include "cli/commands/haptic_paints.h"
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 struct haptic_paints {
     const uint64_t *of;      /* [instances] index of the model of each instance; NULL: 0 */
     uint64_t count, current; /* current: the model that was touched last */
+    atomic_bool undone;      /* no model is painted until the pen is lifted */
+    double touched;          /* time of the last contact */
+    double lift_ms;          /* the pen is lifted when it was not in contact for this time */
     haptic_paint *paint[];   /* [count] */
 };
 
@@ -25,6 +29,8 @@ ebpo_status haptic_paints_open(haptic_paints **out, const haptic_pen *pen,
         return EBPO_E_MEMORY;
     }
     p->of = of;
+    p->touched = -INFINITY;
+    p->lift_ms = fmax(HAPTIC_LIFT_MS, 1500 / pen->rate);
     for (; p->count < count && status == EBPO_OK; p->count += status == EBPO_OK) {
         const haptic_surface *s = &surfaces[p->count];
         const double *size = ebpo_file_info(s->file)->box_size;
@@ -51,12 +57,28 @@ static uint64_t model_of(const haptic_paints *p, const haptic_sample *s)
     return touches && p->of ? p->of[s->instance] : p->current;
 }
 
+/* Returns true in a contact that has lasted since an undo. */
+static bool is_undone(haptic_paints *p, const haptic_sample *s)
+{
+    bool touches = s->flags & EBPO_HAPTIC_CONTACT && !s->lifted;
+    if (s->lifted || s->time - p->touched > p->lift_ms)
+        atomic_store(&p->undone, false);
+    if (touches)
+        p->touched = s->time;
+    return touches && atomic_load(&p->undone);
+}
+
 void haptic_paints_take(void *user, const haptic_sample *samples, uint64_t count)
 {
     haptic_paints *p = user;
     for (uint64_t i = 0, end; i < count; i = end) {
+        if (is_undone(p, &samples[i])) {
+            end = i + 1;
+            continue;
+        }
         p->current = model_of(p, &samples[i]);
-        for (end = i + 1; end < count && model_of(p, &samples[end]) == p->current;)
+        for (end = i + 1; end < count && model_of(p, &samples[end]) == p->current &&
+                          !is_undone(p, &samples[end]);)
             end++;
         haptic_paint_take(p->paint[p->current], samples + i, end - i);
     }
@@ -94,8 +116,12 @@ static bool undo_last(haptic_paints *p)
 bool haptic_paints_command(haptic_paints *p, const char *text)
 {
     bool done = true;
-    if (strcmp(text, "undo") == 0)
-        return undo_last(p);
+    if (strcmp(text, "undo") == 0) {
+        done = undo_last(p);
+        if (done)
+            atomic_store(&p->undone, true);
+        return done;
+    }
     if (p->count > 1 && strncmp(text, "layer", 5) == 0)
         return false;
     for (uint64_t i = 0; i < p->count; i++)

@@ -174,6 +174,10 @@ ebpo_status haptic_scene_paint_in(haptic_scene *s, const char *folder, const cha
             error, EBPO_E_LIMIT, s->name,
             "the scene has more than 64 models with instances, the most for --paint; make "
             "a scene of the models to be painted");
+    for (uint64_t i = 0; i < s->surface_count && status == EBPO_OK; i++)
+        status = set_paint(s, i, folder, record, error);
+    if (status != EBPO_OK)
+        return status;
     if (mkdir(folder, 0777) != 0 && errno != EEXIST)
         return fail_scene(error, EBPO_E_IO, folder, strerror(errno));
     if (stat(folder, &st) != 0 || !S_ISDIR(st.st_mode))
@@ -181,15 +185,15 @@ ebpo_status haptic_scene_paint_in(haptic_scene *s, const char *folder, const cha
             error, EBPO_E_ARGUMENT, folder,
             "is not a folder; with a scene, --paint names a folder, which gets a paint "
             "file for each model");
-    for (uint64_t i = 0; i < s->surface_count && status == EBPO_OK; i++)
-        status = set_paint(s, i, folder, record, error);
-    return status;
+    return EBPO_OK;
 }
 
 /* --- the page --- */
 
-static void write_models(const haptic_scene *s, json *j)
+/* Returns false without memory. */
+static bool write_models(const haptic_scene *s, json *j)
 {
+    bool done = true;
     json_object(j, "models");
     for (uint64_t i = 0; i < s->surface_count; i++) {
         const char *slash = strrchr(s->paths[i], '/');
@@ -197,12 +201,14 @@ static void write_models(const haptic_scene *s, json *j)
         if (asprintf(&file, "models/%llu/%s", (unsigned long long)i,
                      slash ? slash + 1 : s->paths[i]) < 0)
             file = NULL;
+        done &= file != NULL;
         json_object(j, s->surfaces[i].name);
         json_text(j, "file", file ? file : "");
         json_end(j);
         free(file);
     }
     json_end(j);
+    return done;
 }
 
 static void write_instances(const haptic_scene *s, json *j)
@@ -259,11 +265,11 @@ char *haptic_scene_text(const haptic_scene *s)
     json_object(&j, NULL);
     json_text(&j, "ebpo_scene", "1.0");
     json_text(&j, "title", slash ? slash + 1 : s->name);
-    write_models(s, &j);
+    bool done = write_models(s, &j);
     write_instances(s, &j);
     write_cameras(s, &j);
     json_finish(&j);
-    if (fclose(out) == 0)
+    if (fclose(out) == 0 && done)
         return text;
     free(text);
     return NULL;
