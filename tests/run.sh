@@ -87,6 +87,7 @@ for build in "$@"; do
     case $build in
     gcc | clang | sanitize | undefined | thread | memory | posix) ;;
     *)
+        echo "tests/run.sh: unknown word: $build" >&2
         echo "usage: tests/run.sh [quick|full]" \
             "[gcc] [clang] [sanitize] [undefined] [thread] [memory] [posix]" >&2
         exit 2

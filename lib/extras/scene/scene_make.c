@@ -132,7 +132,7 @@ const char *ebpo_scene_path_refused(const char *path, const ebpo_scene_options *
         return "is on a server; add its content_sha256 to the model in the scene";
     if (!ebpo_is_url(path) && !options->allow_outside &&
         (ebpo_path_is_absolute(path) || goes_up(path)))
-        return "is outside the scene's folder; to allow this, use ebpo scene --allow-outside";
+        return "is outside the scene's folder; move it there, or use ebpo scene --allow-outside";
     return NULL;
 }
 
@@ -166,7 +166,7 @@ static ebpo_status check_real(const char *folder, const char *real, const char *
         return EBPO_OK;
     return ebpo_fail_file(error, EBPO_E_FORMAT, path,
                           "leads by a link to the file %.160s, outside the scene's folder %.160s; "
-                          "to allow this, use ebpo scene --allow-outside",
+                          "move it there, or use ebpo scene --allow-outside",
                           real, folder);
 }
 

@@ -120,7 +120,7 @@ static void print_report(const job *j)
     printf("  model: %llu bytes at most, %llu subtrees loaded\n",
            (unsigned long long)j->memory.memory_peak, (unsigned long long)j->memory.loads);
     if (j->v->paint)
-        printf("  painted %llu strokes, %llu points; lost steps %llu; saved %llu times, failed "
+        printf("  painted strokes %llu, points %llu; lost steps %llu; saved %llu times, failed "
                "%llu; longest %.3f s\n",
                (unsigned long long)j->painted.strokes, (unsigned long long)j->painted.points,
                (unsigned long long)j->lost, (unsigned long long)j->painted.saves,

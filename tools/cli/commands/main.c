@@ -63,7 +63,8 @@ static void print_usage(FILE *out)
           "  2  wrong usage\n"
           "  3  not a solid where one is required\n"
           "  4  repack: the content would differ; recover: the content differs; paint: the\n"
-          "     paint belongs to another model; catalogue: files were omitted\n",
+          "     paint belongs to another model; catalogue: files were omitted\n"
+          "  5  boolean: the result is empty\n",
           out);
 }
 
