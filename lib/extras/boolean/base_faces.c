@@ -196,7 +196,7 @@ static ebpo_status gather_in_box(gathering *g, const double box[2][3], int depth
 {
     double half[2][2][3];
     bool uniform;
-    int sign;
+    int sign = 0;
     uint64_t before = g->count;
     ebpo_status status = test_box(g, box, &uniform, &sign, error);
     if (status != EBPO_OK)
