@@ -21,7 +21,7 @@ esac
 # tests/meson.build says what the suites are.
 plan() { # build
     case $tier-$1 in
-    quick-*) echo "0.02 full costly once viewer wasm calls" ;;
+    quick-*) echo "0.02 full costly once viewer wasm calls fuzz" ;;
     full-gcc) echo "1" ;;
     full-clang | full-undefined) echo "0.03 wasm" ;;
     full-sanitize) echo "0.02 wasm" ;;
