@@ -105,26 +105,34 @@ static void print_remedy(FILE *out, const mesh_input *p)
               out);
 }
 
-static void warn_of_inside_out(FILE *out, const char *command, const char *path,
-                               const ebpo_shells *s)
+/* Names the option that orients components, in a form that the command accepts. */
+static const char *orient_text(const mesh_input *p)
 {
+    return p->chosen_by_repair ? "--orient instead of --repair" : "--orient";
+}
+
+static void warn_of_inside_out(FILE *out, const char *command, const char *path,
+                               const mesh_input *p)
+{
+    const ebpo_shells *s = &p->shells;
     fprintf(out,
             "ebpo %s: %s: warning: %llu of %llu closed components %s turned inside out: normals "
             "point inwards, so winding numbers inside are smaller by 1 instead of greater, and the "
-            "rule positive treats the inside as outside; --orient corrects this\n",
+            "rule positive treats the inside as outside; %s corrects this\n",
             command, path, (unsigned long long)s->inside_out, (unsigned long long)s->closed,
-            s->inside_out == 1 ? "is" : "are");
+            s->inside_out == 1 ? "is" : "are", orient_text(p));
 }
 
-static void warn_of_nested(FILE *out, const char *command, const char *path, const ebpo_shells *s)
+static void warn_of_nested(FILE *out, const char *command, const char *path, const mesh_input *p)
 {
+    const ebpo_shells *s = &p->shells;
     fprintf(out,
             "ebpo %s: %s: warning: %llu of %llu closed components %s within another and oriented "
             "outwards "
             "like it: winding numbers inside are greater by 1, so there is no cavity by the rules "
-            "nonzero and positive, but by evenodd there is; --orient makes cavities\n",
+            "nonzero and positive, but by evenodd there is; %s makes cavities\n",
             command, path, (unsigned long long)s->nested, (unsigned long long)s->closed,
-            s->nested == 1 ? "is" : "are");
+            s->nested == 1 ? "is" : "are", orient_text(p));
 }
 
 /* Warns of faces that have the positions and the orientation of an earlier face, but not its
@@ -195,9 +203,9 @@ void advice_warn(FILE *out, const char *command, const char *path, const mesh_in
 {
     char text[1024];
     if (p->shells_counted && p->shells.inside_out && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
-        warn_of_inside_out(out, command, path, &p->shells);
+        warn_of_inside_out(out, command, path, p);
     if (p->shells_counted && p->shells.nested && !(p->doubts & EBPO_DOUBT_INSIDE_OUT))
-        warn_of_nested(out, command, path, &p->shells);
+        warn_of_nested(out, command, path, p);
     if (p->prepared.report.repeated_faces.count)
         warn_of_repeated(out, command, path, p);
     if (p->repeated_same && p->repeated.count > p->prepared.report.repeated_faces.count)
@@ -262,10 +270,11 @@ void advice_print_shells(FILE *out, const mesh_input *p)
     fprintf(out, ", %s",
             words_plural(text, sizeof text, s->inside_out, "is inside out", "are inside out"));
     if (s->nested)
-        fprintf(out, ", %s (--orient makes cavities)",
+        fprintf(out, ", %s (%s makes cavities)",
                 words_plural(text, sizeof text, s->nested,
                              "is within another and oriented outwards like it",
-                             "are within others and oriented outwards like them"));
+                             "are within others and oriented outwards like them"),
+                orient_text(p));
     fputc('\n', out);
 }
 

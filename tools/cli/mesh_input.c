@@ -141,6 +141,7 @@ ebpo_status mesh_input_read_groups(mesh_input *out, const char *path, repair_req
     repairs.flip = requested.flip;
     repairs.fill_holes = requested.fill_holes;
     memset(out, 0, sizeof *out);
+    out->chosen_by_repair = requested.repair;
     out->prepared = (ebpo_prepared)EBPO_PREPARED_INIT;
     out->repairs = (ebpo_repairs)EBPO_REPAIRS_INIT;
     ebpo_status status = groups ? ebpo_mesh_read_groups(path, &options, &out->mesh, groups, error)

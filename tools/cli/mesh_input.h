@@ -23,6 +23,7 @@ typedef struct mesh_input {
     ebpo_mesh as_read; /* the mesh before repairs. Only its facts are valid: its array pointers show
                         * which arrays existed, but must not be used */
     char unread[512];  /* result of ebpo_mesh_ignored; empty: everything was read */
+    bool chosen_by_repair; /* --repair was given, which excludes the options that it chooses from */
     ebpo_prepared prepared; /* findings before and after repairs, and the repairs made */
     bool repairs_tried;     /* true: repairs were tried; their results are in `repairs` */
     ebpo_repairs repairs;

@@ -395,6 +395,9 @@ int site_show_scene(site *s, char *text)
 int site_finish(site *s)
 {
     json j;
+    int code = add_viewer(s);
+    if (code != EXIT_OK)
+        return code;
     FILE *f = open_memstream(&s->list, &s->list_bytes);
     if (!f)
         return command_no_memory(s->options.command);
@@ -464,10 +467,7 @@ site *site_new(const site_options *options)
         return NULL;
     }
     s->options = *options;
-    if (add_viewer(s) == EXIT_OK)
-        return s;
-    site_free(s);
-    return NULL;
+    return s;
 }
 
 size_t site_model_count(const site *s) { return s->models; }

@@ -16,7 +16,7 @@ typedef struct site_options {
 
 typedef struct site site;
 
-/* Makes a site with the files of the viewer. Returns NULL after an error, reported on stderr. */
+/* Makes a site without models. Returns NULL after an error, reported on stderr. */
 site *site_new(const site_options *options);
 
 /* Adds a model, or all models below a folder. Returns an exit code; errors are reported. */
@@ -27,8 +27,8 @@ int site_add(site *s, const char *path);
  * code. */
 int site_show_scene(site *s, char *text);
 
-/* Completes the site after the last model: adds the list of models, and selects the first page.
- * Returns an exit code. */
+/* Completes the site after the last model: adds the files of the viewer and the list of models,
+ * and selects the first page. Returns an exit code; errors are reported. */
 int site_finish(site *s);
 
 /* An http_find_fn, whose `user` is a site. */
