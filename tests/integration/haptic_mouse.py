@@ -44,8 +44,11 @@ def play(ebpo, folder, send, paint, *more):
 
 
 def push(connection, still=1.5):
-    """Press down on the front of the cube, in events whose bytes arrive in pieces, turn, then hold the cap still."""
-    for i in range(100):
+    """Press down on the front of the cube, in events whose bytes arrive in pieces, turn, then hold the cap still.
+
+    Half of the time to press suffices, as the loop of a busy machine may begin after the first events.
+    """
+    for i in range(200):
         event = motion(z=350)
         connection.sendall(event[:i % 32])
         time.sleep(0.005)
