@@ -5,8 +5,10 @@
 
 tools/packaging/windows.sh builds the command in FOLDER; the test is skipped where mingw-w64 or wine is missing. Both
 commands must write equal bytes of files and equal text, and end with equal exit codes: conversions, vectors, queries,
-exports, names that are not ASCII, and long paths. Then tests the servers of the command for Windows.
+exports, pictures, paint, scenes, names that are not ASCII, and long paths. Then tests the servers of the command for
+Windows.
 """
+import json
 import os
 import pathlib
 import random
@@ -24,6 +26,7 @@ MODELS = pathlib.Path(sys.argv[5]) if len(sys.argv) > 5 else None
 SKIPPED = 77
 WINE = shutil.which("wine64") or "/usr/lib/wine/wine64"
 VECTORS = SOURCE / "format-spec/vectors"
+TIMES = rb"(?:, in|;) [\d.]+ s|\"(?:ms|seconds)\": [\d.e-]+"
 problems = []
 count = 0
 
@@ -61,7 +64,7 @@ def compare(what, arguments, data=None, outputs=()):
         out.mkdir()
         code, text, errors = run(program, [str(word).replace("OUT", str(out)) for word in arguments], data)
         folders = rb"[A-Za-z]?:?" + re.escape(str(out).encode())
-        neutral = [re.sub(rb", in [\d.]+ s", b"", re.sub(folders, b"OUT", stream)) for stream in (text, errors)]
+        neutral = [re.sub(TIMES, b"", re.sub(folders, b"OUT", stream)) for stream in (text, errors)]
         results.append((code, *neutral, *[(out / path).read_bytes() if (out / path).exists() else None
                                           for path in outputs]))
     for part, linux, windows in zip(("exit code", "output", "messages", *outputs), *results):
@@ -94,8 +97,10 @@ def vectors():
         compare(f"verify {path.name}", ["verify", path])
         compare(f"info {path.name}", ["info", "--json", path])
         compare(f"mesh of {path.name}", ["extract", "--mesh", path, "OUT/a.ply"], outputs=["a.ply"])
-    for path in sorted(VECTORS.glob("failed/*.ebpo.h5")):
-        compare(f"verify {path.name}", ["verify", path])
+    for path in sorted([*VECTORS.glob("failed/*.ebpo.h5"), *VECTORS.glob("former/*.ebpo.h5")]):
+        compare(f"verify {path.parent.name}/{path.name}", ["verify", path])
+    for path in sorted(VECTORS.glob("paint/*/*.paint.h5")):
+        compare(f"paint {path.parent.name}/{path.name}", ["paint", "--json", "--strokes", "--points", path])
 
 
 def queries(models):
@@ -122,6 +127,24 @@ def queries(models):
     compare("collide", ["collide", *models[:2]])
     compare("collide in JSON", ["collide", "--json", "--distance", *models[:2]])
     compare("boolean", ["boolean", "A - B", *models[:2], "-o", "OUT/a.ply"], outputs=["a.ply"])
+
+
+def other_commands(model, mesh):
+    """Compare commands that examine, draw, paint and place a model."""
+    for command in ("check", "check --crossings", "check --json"):
+        compare(command, [*command.split(), mesh])
+    for words, output in {"map -q --plane z=50% --size 60x40": "a.png", "map -q --grid 8,8,8": "a.nrrd",
+                          "map -q --grid 8,8,9": "a.vtkhdf", "view --json --eye 5,4,3 --bytes 200K": "a.ply"}.items():
+        compare(words, [*words.split(), "-o", f"OUT/{output}", model], outputs=[output])
+    compare("envelopes", ["extract", "--level", "3", model, "OUT/a.ply"], outputs=["a.ply"])
+    compare("picture", ["render", "--size", "320x200", "--edges", model, "OUT/a.png"], outputs=["a.png"])
+    compare("brush", ["paint", "OUT/a.paint.h5", model, "--new-layer", "Risse", "--date", "2026-01-02", "--path", "-",
+                      "--radius", "0.05"], b"1 0 0\n1 0.2 0.1 0.5\n1 0.4 0.1 1\n", outputs=["a.paint.h5"])
+    scene = FOLDER / "a.scene.json"
+    scene.write_text(json.dumps({"ebpo_scene": "1.0", "models": {"a": {"file": model.name}}, "instances": [
+        {"name": "one", "model": "a"}, {"name": "two", "model": "a", "pose": {"translation": [0.5, 0.25, 0]}}]}))
+    for words in ("info", "boxes", "pairs", "report --count --locations", "report --json --solids --depth 0.1"):
+        compare(f"scene {words}", ["scene", *words.split(), scene])
 
 
 def names(mesh):
@@ -167,6 +190,19 @@ def servers(model):
         report(f"haptic_udp.py: {done.stdout}{done.stderr}")
 
 
+def compare_all():
+    inputs = conversions()
+    models = []
+    for name, path in inputs.items():
+        models.append(FOLDER / f"{name}.ebpo.h5")
+        subprocess.run([EBPO, "convert", "-q", path, models[-1]], check=True)
+    vectors()
+    queries(models)
+    other_commands(models[0], inputs["torus"])
+    names(inputs["sphere"])
+    servers(models[0])
+
+
 def main():
     global WINDOWS
     absent = missing()
@@ -179,18 +215,16 @@ def main():
     shutil.rmtree(FOLDER / "unpacked", ignore_errors=True)
     zipfile.ZipFile(archive).extractall(FOLDER / "unpacked")
     WINDOWS = [WINE, str(next(FOLDER.glob("unpacked/*/bin/ebpo.exe")))]
-    # Wine's own processes stay, so that their messages are not those of the command.
-    subprocess.run([WINE.replace("wine64", "wineserver64"), "-p"], env=wine_environment(), check=False)
-    run(WINDOWS, ["--version"])
-    inputs = conversions()
-    models = []
-    for name, path in inputs.items():
-        models.append(FOLDER / f"{name}.ebpo.h5")
-        subprocess.run([EBPO, "convert", "-q", path, models[-1]], check=True)
-    vectors()
-    queries(models)
-    names(inputs["sphere"])
-    servers(models[0])
+    # Wine's own processes stay, so that their messages are not those of the command. They keep the messages' pipe of the
+    # command that starts them open, so that one has none.
+    server = WINE.replace("wine64", "wineserver64")
+    subprocess.run([server, "-p"], env=wine_environment(), check=False)
+    subprocess.run([*WINDOWS, "--version"], env=wine_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                   stderr=subprocess.DEVNULL, timeout=600, check=True)
+    try:
+        compare_all()
+    finally:
+        subprocess.run([server, "-k"], env=wine_environment(), check=False)
     print(f"{count} comparisons, {len(problems)} differ")
     return 1 if problems else 0
 

@@ -437,9 +437,11 @@ class Meshes(Case):
                                          triangle=types.SimpleNamespace(indices=tensors[1])), "tensors")
         self.check(types.SimpleNamespace(geometry={}, to_mesh=lambda: types.SimpleNamespace(vertices=vertices, faces=faces)),
                    "scene")
-        grid = types.SimpleNamespace(points=vertices, triangulate=lambda: types.SimpleNamespace(points=vertices))
-        with self.assertRaisesRegex(TypeError, "extract_surface"):
-            ebpo.convert(grid, "never.ebpo.h5")
+        for cells in ({}, {"celltypes": np.array([10]), "faces": np.array([0])}):  # the latter: PyVista 0.46
+            grid = types.SimpleNamespace(points=vertices, triangulate=lambda cells=cells:
+                                         types.SimpleNamespace(points=vertices, **cells))
+            with self.assertRaisesRegex(TypeError, "extract_surface"):
+                ebpo.convert(grid, "never.ebpo.h5")
         for wrong in (17, types.SimpleNamespace(points=vertices), [1, 2, 3]):
             with self.assertRaisesRegex(TypeError, "trimesh"):
                 ebpo.convert(wrong, "never.ebpo.h5")

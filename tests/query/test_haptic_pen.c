@@ -27,14 +27,16 @@ typedef struct pen_test {
     query_model m;
     char path[SCRATCH_LENGTH + 32];
     haptic_pen pen;
-    haptic_paint *paint; /* NULL: closed */
-    ebpo_paint *made;    /* NULL: paint is open */
-    uint64_t strokes;    /* in the file */
+    haptic_surface surface;
+    haptic_paints *paint; /* NULL: closed */
+    ebpo_paint *made;     /* NULL: paint is open */
+    uint64_t strokes;     /* in the file */
 } pen_test;
 
 static void open_pen(pen_test *t)
 {
-    ASSERT_OK(haptic_paint_open(&t->paint, &t->pen, t->m.file, t->m.model, error));
+    t->surface = (haptic_surface){ NULL, t->path, t->m.file, t->m.model };
+    ASSERT_OK(haptic_paints_open(&t->paint, &t->pen, &t->surface, 1, NULL, error));
 }
 
 static void begin(pen_test *t)
@@ -43,13 +45,11 @@ static void begin(pen_test *t)
     memset(t, 0, sizeof *t);
     query_model_make(&t->m, "box", ebpo_test_box(low, high, 4), &query_variants[0]);
     snprintf(t->path, sizeof t->path, "%s/pen.paint.h5", t->m.folder);
-    t->pen = (haptic_pen){ .path = t->path,
-                           .pen = EBPO_PAINT_PEN_INIT,
+    t->pen = (haptic_pen){ .pen = EBPO_PAINT_PEN_INIT,
                            .default_layer = true,
                            .stiffness = 1,
                            .full_force = 1,
                            .fade = 1,
-                           .diagonal = sqrt(3),
                            .rate = 1000 };
     t->pen.pen.radius = radius;
     t->pen.pen.colour = 0xff0000ff;
@@ -60,7 +60,7 @@ static uint64_t read_strokes(pen_test *t)
 {
     haptic_painted painted;
     ebpo_paint_info info = EBPO_PAINT_INFO_INIT;
-    ASSERT_OK(haptic_paint_close(t->paint, &painted, error));
+    ASSERT_OK(haptic_paints_close(t->paint, &painted, error));
     t->paint = NULL;
     ebpo_paint_free(t->made);
     ASSERT_OK(ebpo_paint_open(t->path, &t->made, error));
@@ -101,7 +101,7 @@ static uint64_t strokes_with_gap(double period, double lost)
     for (int i = 0; i < 200; i++) {
         double time = period * (i + (i < 100 ? 0 : lost));
         haptic_sample s = touch_at(time, 0.1 + 0.002 * i + (i < 100 ? 0 : 0.3), 1);
-        haptic_paint_take(t.paint, &s, 1);
+        haptic_paints_take(t.paint, &s, 1);
     }
     uint64_t strokes = read_strokes(&t);
     for (uint64_t i = 0; i < strokes; i++)
@@ -225,7 +225,7 @@ START_TEST(test_pen_has_least_step)
     t.pen.pen.radius = 1e-12;
     open_pen(&t);
     haptic_sample s[2] = { touch_at(0, 0.2, 1), touch_at(1, 0.3, 1) };
-    haptic_paint_take(t.paint, s, 2);
+    haptic_paints_take(t.paint, s, 2);
     ck_assert_uint_eq(read_strokes(&t), 1);
     double wanted = 0.1 / (1e-5 * sqrt(3));
     ck_assert_double_le(fabs((double)stroke_at(&t, 0).point_count - wanted), 2);
@@ -251,7 +251,7 @@ START_TEST(test_pen_slices_are_equal)
         for (uint64_t i = 0, n; i < STEPS; i += n) {
             n = k ? 1 + ebpo_test_random(&state) % 50 : STEPS;
             n = n < STEPS - i ? n : STEPS - i;
-            haptic_paint_take(t[k].paint, s + i, n);
+            haptic_paints_take(t[k].paint, s + i, n);
         }
         count[k] = read_strokes(&t[k]);
     }
@@ -281,7 +281,7 @@ START_TEST(test_pen_opacity_follows_pressure)
     for (int i = 0; i < 1000; i++) {
         double pressure = i < 800 ? i / 800.0 : 0.53 + 0.02 * sin(i);
         haptic_sample s = touch_at(i, 0.1 + 0.0008 * i, pressure);
-        haptic_paint_take(t.paint, &s, 1);
+        haptic_paints_take(t.paint, &s, 1);
     }
     ck_assert_uint_eq(read_strokes(&t), 16);
     for (uint64_t i = 0; i < 16; i++) {
@@ -332,9 +332,9 @@ START_TEST(test_pen_opacity_does_not_accumulate)
             double x = i < 0 ? 0.1 : 0.3 + moves * fmax(0, fmin(0.2, 0.001 * (i - 200)));
             haptic_sample s = touch_at(i + 200, x, pressure);
             s.lifted = i > -100 && i < 0;
-            haptic_paint_take(t.paint, &s, 1);
+            haptic_paints_take(t.paint, &s, 1);
             if (i % 7 == 0)
-                haptic_paint_write_news(t.paint, &cursor, out);
+                haptic_paints_write_news(t.paint, &cursor, out);
         }
         fclose(out);
         uint64_t strokes = read_strokes(&t);
@@ -361,10 +361,10 @@ START_TEST(test_pen_undo_removes_contacts)
         for (int i = 0; i < 400; i++) {
             haptic_sample s = touch_at(i, 0.1 + 0.002 * i, i % 200 / 200.0);
             s.lifted = i % 200 < 20 || i % 200 > 160;
-            haptic_paint_take(t.paint, &s, 1);
+            haptic_paints_take(t.paint, &s, 1);
         }
         for (int k = 0; k < (run ? 3 : 1); k++)
-            ck_assert_int_eq(haptic_paint_command(t.paint, "undo"), k < 2);
+            ck_assert_int_eq(haptic_paints_command(t.paint, "undo"), k < 2);
         /* The first run has an opacity for each level from 2 to 12, the second one a constant one.
          */
         ck_assert_uint_eq(read_strokes(&t), 11);
@@ -383,9 +383,9 @@ START_TEST(test_pen_paints_nothing_after_undo)
         haptic_sample s = touch_at(i, 0.1 + 0.001 * i, 1);
         s.flags = i >= 150 && i < 160 ? 0 : s.flags; /* a gap that does not lift the pen */
         s.lifted = i >= 300 && i < 350;
-        haptic_paint_take(t.paint, &s, 1);
+        haptic_paints_take(t.paint, &s, 1);
         if (i == 100)
-            ck_assert(haptic_paint_command(t.paint, "undo"));
+            ck_assert(haptic_paints_command(t.paint, "undo"));
     }
     ck_assert_uint_eq(read_strokes(&t), 1);
     ck_assert_double_gt(stroke_at(&t, 0).points[0].place[0], 0.44);
@@ -402,7 +402,7 @@ START_TEST(test_pen_takes_pressure_of_stylus)
     for (int i = 0; i < 100; i++) {
         haptic_sample s = touch_at(i, 0.1 + 0.002 * i, 1);
         s.pressure = 0.25;
-        haptic_paint_take(t.paint, &s, 1);
+        haptic_paints_take(t.paint, &s, 1);
     }
     ck_assert_uint_eq(read_strokes(&t), 1);
     ebpo_paint_stroke s = stroke_at(&t, 0);
@@ -443,7 +443,7 @@ static void move_brush(pen_test *t, double tilt, double depth)
         s.rotation[1] = sin(tilt / 2);
         s.rotation[3] = cos(tilt / 2);
         press_down(&s);
-        haptic_paint_take(t->paint, &s, 1);
+        haptic_paints_take(t->paint, &s, 1);
     }
 }
 
@@ -497,7 +497,7 @@ static void press_point(pen_test *t, double height, double depth, double depth_s
         memcpy(s.proxy, s.touch, sizeof s.proxy);
         s.rotation[3] = 1;
         press_down(&s);
-        haptic_paint_take(t->paint, &s, 1);
+        haptic_paints_take(t->paint, &s, 1);
     }
 }
 
@@ -543,8 +543,8 @@ START_TEST(test_pen_brush_is_undone)
     pen_test t;
     begin(&t);
     move_brush(&t, 0, 0.01);
-    ck_assert(haptic_paint_command(t.paint, "undo"));
-    ck_assert(!haptic_paint_command(t.paint, "undo"));
+    ck_assert(haptic_paints_command(t.paint, "undo"));
+    ck_assert(!haptic_paints_command(t.paint, "undo"));
     ck_assert_uint_eq(read_strokes(&t), 0);
     end(&t);
 }
@@ -606,7 +606,7 @@ START_TEST(test_pen_follows_after_silence)
 END_TEST
 
 typedef struct painter {
-    haptic_paint *paint;
+    haptic_paints *paint;
     atomic_int slices; /* number of painted slices; SLICES: ended */
 } painter;
 
@@ -619,7 +619,7 @@ static void *paint_slices(void *user)
     for (int i = 0; i < SLICES * SLICE; i++) {
         s[i % SLICE] = touch_at(i, 0.1 + 0.8 * i / SLICES / SLICE, 1);
         if (i % SLICE == SLICE - 1) {
-            haptic_paint_take(p->paint, s, SLICE);
+            haptic_paints_take(p->paint, s, SLICE);
             atomic_fetch_add(&p->slices, 1);
         }
     }
@@ -644,7 +644,7 @@ START_TEST(test_pen_shares_lock)
     ck_assert_ptr_nonnull(out);
     ck_assert_int_eq(pthread_create(&thread, NULL, paint_slices, &p), 0);
     for (int before; (before = atomic_load(&p.slices)) < SLICES && looks < SLICES; looks++) {
-        haptic_paint_write_news(t.paint, &cursor, out);
+        haptic_paints_write_news(t.paint, &cursor, out);
         waited[looks] = atomic_load(&p.slices) - before;
         nanosleep(&(struct timespec){ 0, 200000 }, NULL);
     }

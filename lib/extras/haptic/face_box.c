@@ -246,9 +246,9 @@ static double min_square_of_leaf(const ebpo_face_box *box, uint64_t leaf, const 
     return least;
 }
 
-/* Returns a lower bound of the squared distance of `around` from the faces. *leaf: see
- * ebpo_face_box_gap. */
-static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *around,
+/* Returns a lower bound of the squared distance of `around` from the faces, at most `least`. *leaf:
+ * see ebpo_face_box_gap. */
+static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *around, double least,
                                   uint32_t max_visits, uint64_t *leaf, uint64_t *visits)
 {
     struct {
@@ -256,11 +256,10 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
         double lower;
     } stack[64]; /* at most one node of each level waits */
     int depth = 0;
-    double least = INFINITY;
     if (box->count == 0)
-        return INFINITY;
+        return least;
     if (*leaf < box->leaves) {
-        least = min_square_of_leaf(box, *leaf, around);
+        least = smaller_of(least, min_square_of_leaf(box, *leaf, around));
         ++*visits;
     }
     stack[depth].node = 1;
@@ -293,10 +292,11 @@ static double min_square_distance(const ebpo_face_box *box, const ebpo_extent *a
     return least;
 }
 
-double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                         uint64_t *leaf, uint64_t *visits)
+double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, double most,
+                         uint32_t max_visits, uint64_t *leaf, uint64_t *visits)
 {
-    return sqrt(min_square_distance(box, around, max_visits, leaf, visits)) * (1 - 0x1p-48);
+    return sqrt(min_square_distance(box, around, most * most, max_visits, leaf, visits)) *
+           (1 - 0x1p-48);
 }
 
 /* --- the nearest point of a face --- */

@@ -70,12 +70,13 @@ void ebpo_face_box_end(ebpo_face_box *box);
 bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uint32_t *found,
                         uint32_t most, uint32_t *visits, uint32_t *count);
 
-/* Returns a lower bound of the distance of `around` from the faces of the box. The bound is less
- * accurate if the search ends because of max_visits, the limit of visited nodes. Adds the number of
- * visited nodes to *visits. *leaf: a leaf that may be near, at which the search begins; any value
- * is valid. It is set to the nearest leaf that was visited. */
-double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, uint32_t max_visits,
-                         uint64_t *leaf, uint64_t *visits);
+/* Returns a lower bound of the distance of `around` from the faces of the box, at most `most`: the
+ * search visits no farther nodes. The bound is less accurate if the search ends because of
+ * max_visits, the limit of visited nodes. Adds the number of visited nodes to *visits. *leaf: a
+ * leaf that may be near, at which the search begins; any value is valid. It is set to the nearest
+ * leaf that was visited. */
+double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, double most,
+                         uint32_t max_visits, uint64_t *leaf, uint64_t *visits);
 
 /* --- distances of points and of moving balls from a face, in doubles --- */
 

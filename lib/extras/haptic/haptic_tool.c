@@ -27,6 +27,10 @@ enum {
     CONTACT_COST = 6
 };
 
+/* A search for a distance ends at this multiple of the needed distance. A wider search saves later
+ * searches for points that are far from faces, but visits more nodes. */
+static const double enough = 16;
+
 /* Distances in units of the skin. */
 static const double search_distance =
     2.5; /* faces within this distance of a point's path are examined */
@@ -70,10 +74,10 @@ static void box_of_segment(const double p[3], const double q[3], double wide, eb
 }
 
 /* Returns a lower bound of the distance of `e` from all faces. The bound is computed from the faces
- * of the box and the boundary of the loaded region, or from the box of the model. *leaf: see
- * ebpo_face_box_gap. */
-static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t visits,
-                            uint64_t *leaf)
+ * of the box and the boundary of the loaded region, or from the box of the model. needed: the
+ * caller needs to know if the distance is at least this. *leaf: see ebpo_face_box_gap. */
+static double free_distance(const tool_piece *p, const ebpo_extent *e, double needed,
+                            uint32_t visits, uint64_t *leaf)
 {
     double out = 0, inside = INFINITY;
     for (int i = 0; i < 3; i++)
@@ -83,7 +87,8 @@ static double free_distance(const tool_piece *p, const ebpo_extent *e, uint32_t 
     for (int i = 0; i < 3; i++)
         inside = fmin(inside,
                       fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
-    return fmax(out, fmin(inside, ebpo_face_box_gap(p->box, e, visits, leaf, p->work)));
+    double gap = ebpo_face_box_gap(p->box, e, enough * needed, visits, leaf, p->work);
+    return fmax(out, fmin(inside, gap));
 }
 
 /* Bounds the motion of points whose distance from the tool's centre is at most `lever`. */
@@ -219,7 +224,8 @@ static bool inspect_point(const tool_piece *p, ebpo_tool_cluster *c, uint32_t po
     }
     ebpo_extent e;
     box_of_segment(from, from, 0, &e);
-    tool->safe_until[point] = travelled + free_distance(p, &e, POINT_VISITS, &c->leaf) - margin;
+    tool->safe_until[point] =
+        travelled + free_distance(p, &e, motion + margin, POINT_VISITS, &c->leaf) - margin;
     return tool->safe_until[point] - travelled - motion > 0 || find_close_point(p, point, from);
 }
 
@@ -265,11 +271,11 @@ static bool inspect_cluster(const tool_piece *p, uint32_t number)
         return true;
     if (tool->next_point > 0 || few_expired(p, c, motion))
         return inspect_points(p, c, motion);
-    double at[3], distance;
+    double at[3], distance, margin = search_distance * p->skin;
     ebpo_extent e;
     ebpo_tool_at(&tool->proxy, (const double(*)[3])tool->from_matrix, c->middle, at);
     box_of_segment(at, at, c->radius, &e);
-    distance = free_distance(p, &e, CLUSTER_VISITS, &c->leaf) - search_distance * p->skin;
+    distance = free_distance(p, &e, motion + margin, CLUSTER_VISITS, &c->leaf) - margin;
     if (distance - motion <= 0)
         return inspect_points(p, c, motion);
     c->safe_until = travelled + distance;

@@ -73,7 +73,6 @@ struct haptic_paint {
     double moved;                /* greatest distance from `first` */
     bool falls;                  /* the stroke began because the pressure fell */
     int level;                   /* opacity of the stroke: 1 to LEVELS; 0: no stroke */
-    bool undone;                 /* nothing is painted until the pen is lifted */
     bool pressed;                /* the brush has painted in this contact, at `print` */
     haptic_sample print;         /* the last step in which the brush has painted */
     double print_pressure;
@@ -569,15 +568,12 @@ static uint64_t take_some(haptic_paint *p, const haptic_sample *samples, uint64_
     ebpo_paint_input input[SLICE + 1];
     uint64_t taken = 0, n = 0;
     bool touches = is_touching(&samples[0]);
-    if (samples[0].lifted ||
-        samples[0].time - p->touched > (touches ? p->lost_ms : HAPTIC_LIFT_MS)) {
+    if (samples[0].lifted || samples[0].time - p->touched > (touches ? p->lost_ms : HAPTIC_LIFT_MS))
         lift_pen(p);
-        p->undone = false;
-    }
     if (!touches)
         return 1;
     p->touched = samples[0].time;
-    if (p->undone)
+    if (atomic_load(p->pen.undone))
         return 1;
     if (p->pen.point_count > 0) {
         press_brush(p, &samples[0]);
@@ -622,7 +618,6 @@ static bool touch_instance(haptic_paint *p, const haptic_sample *s)
     if (p->instance != UINT64_MAX && s->time - p->touched <= p->lost_ms)
         return false;
     lift_pen(p);
-    p->undone = false;
     p->instance = s->instance;
     p->pose = p->pen.poses ? &p->pen.poses[s->instance] : NULL;
     return true;
@@ -663,9 +658,8 @@ double haptic_paint_last_contact(haptic_paint *p)
     return begin;
 }
 
-/* Removes the strokes of the last contact of this run that has painted. If the tool still touches,
- * it paints nothing until it was lifted. Returns false if there is none. The caller has the lock.
- */
+/* Removes the strokes of the last contact of this run that has painted, and sets `undone` of the
+ * pen. Returns false if there is none. The caller has the lock. */
 static bool undo_contact(haptic_paint *p)
 {
     const haptic_contact *last = last_contact(p);
@@ -676,7 +670,7 @@ static bool undo_contact(haptic_paint *p)
     p->finished = info_of(p->drawn).stroke_count;
     if (p->copied > p->finished)
         p->copied = p->finished;
-    p->undone = true;
+    atomic_store(p->pen.undone, true);
     return removed;
 }
 

@@ -2,6 +2,7 @@
 #ifndef EBPO_TOOLS_HAPTIC_PAINT_H
 #define EBPO_TOOLS_HAPTIC_PAINT_H
 
+#include <stdatomic.h>
 #include <stdio.h>
 
 #include <ebpo/haptic.h>
@@ -19,6 +20,7 @@ typedef struct haptic_pen {
     const char *path;       /* paint file; a new file gets a layer */
     const char *name;       /* of the model in its scene; NULL: a single model */
     const ebpo_pose *poses; /* [instances of the scene]; NULL: the model is not posed */
+    atomic_bool *undone;    /* nothing is painted while it is true; undo sets it */
     ebpo_paint_pen pen;     /* seed, time and progress are not used */
     bool default_colour;    /* pen.colour is that of the layer */
     bool default_layer;     /* pen.layer is the topmost one */

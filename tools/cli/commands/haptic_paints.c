@@ -8,7 +8,7 @@
 struct haptic_paints {
     const uint64_t *of;      /* [instances] index of the model of each instance; NULL: 0 */
     uint64_t count, current; /* current: the model that was touched last */
-    atomic_bool undone;      /* no model is painted until the pen is lifted */
+    atomic_bool undone;      /* since an undo, the pen was not lifted */
     double touched;          /* time of the last contact */
     double lift_ms;          /* the pen is lifted when it was not in contact for this time */
     haptic_paint *paint[];   /* [count] */
@@ -37,6 +37,7 @@ ebpo_status haptic_paints_open(haptic_paints **out, const haptic_pen *pen,
         haptic_pen own = *pen;
         own.path = s->paint;
         own.name = s->name;
+        own.undone = &p->undone;
         own.diagonal = hypot(hypot(size[0], size[1]), size[2]);
         status = haptic_paint_open(&p->paint[p->count], &own, s->file, s->model, error);
     }
@@ -57,29 +58,25 @@ static uint64_t model_of(const haptic_paints *p, const haptic_sample *s)
     return touches && p->of ? p->of[s->instance] : p->current;
 }
 
-/* Returns true in a contact that has lasted since an undo. */
-static bool is_undone(haptic_paints *p, const haptic_sample *s)
+/* Returns true if the pen was lifted after the last contact, or is lifted in this step. */
+static bool is_lifted(const haptic_paints *p, const haptic_sample *s)
 {
-    bool touches = s->flags & EBPO_HAPTIC_CONTACT && !s->lifted;
-    if (s->lifted || s->time - p->touched > p->lift_ms)
-        atomic_store(&p->undone, false);
-    if (touches)
-        p->touched = s->time;
-    return touches && atomic_load(&p->undone);
+    return s->lifted || s->time - p->touched > p->lift_ms;
 }
 
+/* Passes runs of steps on one model. A lifted pen begins a run, which ends an undo. */
 void haptic_paints_take(void *user, const haptic_sample *samples, uint64_t count)
 {
     haptic_paints *p = user;
     for (uint64_t i = 0, end; i < count; i = end) {
-        if (is_undone(p, &samples[i])) {
-            end = i + 1;
-            continue;
-        }
+        if (is_lifted(p, &samples[i]))
+            atomic_store(&p->undone, false);
         p->current = model_of(p, &samples[i]);
-        for (end = i + 1; end < count && model_of(p, &samples[end]) == p->current &&
-                          !is_undone(p, &samples[end]);)
-            end++;
+        for (end = i; end == i || (end < count && model_of(p, &samples[end]) == p->current &&
+                                   !is_lifted(p, &samples[end]));
+             end++)
+            if (samples[end].flags & EBPO_HAPTIC_CONTACT && !samples[end].lifted)
+                p->touched = samples[end].time;
         haptic_paint_take(p->paint[p->current], samples + i, end - i);
     }
 }
@@ -116,12 +113,8 @@ static bool undo_last(haptic_paints *p)
 bool haptic_paints_command(haptic_paints *p, const char *text)
 {
     bool done = true;
-    if (strcmp(text, "undo") == 0) {
-        done = undo_last(p);
-        if (done)
-            atomic_store(&p->undone, true);
-        return done;
-    }
+    if (strcmp(text, "undo") == 0)
+        return undo_last(p);
     if (p->count > 1 && strncmp(text, "layer", 5) == 0)
         return false;
     for (uint64_t i = 0; i < p->count; i++)

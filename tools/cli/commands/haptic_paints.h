@@ -18,9 +18,9 @@ typedef struct haptic_surface {
 
 typedef struct haptic_paints haptic_paints;
 
-/* Opens the paint files of all surfaces, see haptic_paint_open. pen: for all; its path, name and
- * diagonal are not used. of: [instances of the scene] index of the surface of each instance; NULL:
- * there is one surface. All arguments must outlive the object. */
+/* Opens the paint files of all surfaces, see haptic_paint_open. pen: for all; its path, name,
+ * diagonal and undone are not used. of: [instances of the scene] index of the surface of each
+ * instance; NULL: there is one surface. All arguments must outlive the object. */
 ebpo_status haptic_paints_open(haptic_paints **out, const haptic_pen *pen,
                                const haptic_surface *surfaces, uint64_t count, const uint64_t *of,
                                ebpo_error *error);

@@ -21,7 +21,7 @@ def arrays_of(mesh: Any) -> tuple[Any, Any]:
     """
     if hasattr(mesh, "points") and hasattr(mesh, "triangulate"):  # PyVista
         flat = mesh.triangulate()
-        if not hasattr(flat, "faces"):  # cells of volumes
+        if hasattr(flat, "celltypes") or not hasattr(flat, "faces"):  # cells of volumes; older grids have faces too
             raise TypeError(f"{type(mesh).__name__} of PyVista has no faces; convert its extract_surface()")
         return np.asarray(mesh.points), np.asarray(flat.faces).reshape(-1, 4)[:, 1:]
     if hasattr(mesh, "vertex") and hasattr(mesh, "triangle"):  # tensors of Open3D
