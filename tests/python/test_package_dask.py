@@ -66,6 +66,22 @@ class Results(Case):
         near = ed.distance("scan.ebpo.h5", P[:999], max_distance=.1).face.compute()
         np.testing.assert_array_equal(near, m.distance(P[:999], max_distance=.1).face)
 
+    def test_masked(self):
+        """Masked coordinates are NaN, as in the queries of a model."""
+        m, hidden = model("scan"), np.zeros((400, 3), bool)
+        hidden[[3, 250], 1] = True
+        masked, origins = np.ma.masked_array(P[:400], hidden), 2 * P[:400]
+        for given in (masked, dask.array.from_array(masked, chunks=(99, 3))):
+            with dask.config.set(scheduler="sync"):
+                self.same(dask.compute(*ed.distance("scan.ebpo.h5", given, nan="propagate")[:4]),
+                          m.distance(masked, nan="propagate"))
+                self.same(dask.compute(*ed.ray("scan.ebpo.h5", origins, given, nan="propagate")[:3]),
+                          m.ray(origins, masked, nan="propagate"))
+                self.same(dask.compute(*ed.ray("scan.ebpo.h5", origins, masked[3], nan="propagate")[:3]),
+                          m.ray(origins, masked[3], nan="propagate"))
+                with self.assertRaisesRegex(ebpo.ArgumentError, "point 3 has a coordinate that is not a finite"):
+                    ed.inside("scan.ebpo.h5", given).compute()
+
     def test_points_from_everywhere(self):
         m, expected = model("scan"), model("scan").winding(P)
         given = [(P, None), (dask.array.from_array(P, chunks=(6000, 2)), None), (INPUT, None), ("points.raw", None),

@@ -359,23 +359,39 @@ static void eye_box(const view_search *s, double from, double to, ebpo_scene_bou
     }
 }
 
+/* Returns the greatest scale of an instance between two times. Between two keys of its route, the
+ * scale changes at constant speed or not at all. So the scale is greatest at a key or an end. */
+static ebpo_status greatest_scale(const ebpo_scene *scene, uint64_t instance, double from,
+                                  double to, double *scale, ebpo_error *error)
+{
+    const ebpo_scene_route *route = route_of(scene, instance);
+    ebpo_status status = EBPO_OK;
+    *scale = 0;
+    for (double at = from; status == EBPO_OK;) {
+        ebpo_pose pose;
+        status = ebpo_scene_pose(scene, instance, at, &pose, error);
+        *scale = status == EBPO_OK ? fmax(*scale, pose.scale) : *scale;
+        if (!(at < to))
+            break;
+        at = route ? ebpo_scene_route_next(route, at, to) : to;
+    }
+    return status;
+}
+
 /* Computes a lower bound of the distance of an instance from the eye between two times, and the
  * instance's greatest scale. */
 static ebpo_status distance_between(const view_search *s, uint64_t instance, double from, double to,
                                     double *distance, double *scale)
 {
     ebpo_scene_bounds eye, box;
-    ebpo_pose at[2];
     eye_box(s, from, to, &eye);
     ebpo_status status = ebpo_scene_instance_box(s->needs->scene, instance, from, to, box.min,
                                                  box.max, s->needs->error);
-    for (int i = 0; i < 2 && status == EBPO_OK; i++)
-        status = ebpo_scene_pose(s->needs->scene, instance, i ? to : from, &at[i], s->needs->error);
-    if (status != EBPO_OK)
-        return status;
-    *distance = ebpo_scene_bounds_gap(&eye, &box);
-    *scale = fmax(at[0].scale, at[1].scale);
-    return EBPO_OK;
+    if (status == EBPO_OK)
+        status = greatest_scale(s->needs->scene, instance, from, to, scale, s->needs->error);
+    if (status == EBPO_OK)
+        *distance = ebpo_scene_bounds_gap(&eye, &box);
+    return status;
 }
 
 /* Returns true if a box is behind a camera that does not move. */

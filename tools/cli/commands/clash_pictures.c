@@ -248,8 +248,11 @@ static ebpo_status paint_instances(const clash_strip *s, double time, uint8_t *c
         ebpo_scene_instance at = EBPO_SCENE_INSTANCE_INIT;
         (void)ebpo_scene_get_instance(s->scene, i, &at);
         uint8_t paint = at.fixed ? RASTER_PLAIN : RASTER_OTHER;
-        status = s->boxes && !red[i] ? painted_add_box(out, s->scene, i, time, paint, error)
-                                     : painted_add(out, s->scene, i, time, red[i], paint, error);
+        /* ebpo scene pack omits the mesh of a model that no other instance comes near */
+        bool has_mesh = ebpo_file_info(ebpo_scene_file(s->scene, at.model))->parts & EBPO_PART_MESH;
+        status = !has_mesh || (s->boxes && !red[i])
+                     ? painted_add_box(out, s->scene, i, time, paint, error)
+                     : painted_add(out, s->scene, i, time, red[i], paint, error);
     }
     return status;
 }

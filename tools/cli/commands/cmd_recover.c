@@ -497,7 +497,8 @@ static int run_recover(void *given, const char **operand)
     ebpo_error error = EBPO_ERROR_INIT;
     if (!v->out)
         return command_usage("recover", "name the new file with --output");
-    if (!memory_check("recover", &v->memory) || command_overwrites("recover", operand[0], v->out))
+    if (!memory_check("recover", &v->memory) || command_overwrites("recover", operand[0], v->out) ||
+        (v->source && command_overwrites("recover", v->source, v->out)))
         return EXIT_USAGE;
     if (!command_requires_hdf5("recover", operand[0]))
         return EXIT_FAILED;

@@ -136,9 +136,14 @@ static int parse_values(job *j)
             "at most 24 of 'mesh' and levels, such as 0-3,mesh; the deepest possible is 20");
     if (!v->levels)
         j->tiles[j->tile_count++].level = v->level >= 0 ? (int)v->level : MESH;
-    bool draws_mesh = false;
-    for (int i = 0; i < j->tile_count; i++)
+    bool draws_mesh = false, draws_level = false;
+    for (int i = 0; i < j->tile_count; i++) {
         draws_mesh = draws_mesh || j->tiles[i].level == MESH;
+        draws_level = draws_level || j->tiles[i].level != MESH;
+    }
+    if (v->surface && !draws_level)
+        return command_usage("render", "--surface applies to pictures of levels only; give --level "
+                                       "or --levels");
     if (v->caps && !draws_mesh)
         return command_usage("render", "--caps applies to pictures of the mesh only");
     return EXIT_OK;

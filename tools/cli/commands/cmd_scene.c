@@ -1,4 +1,5 @@
 /* ebpo scene: queries rigid and animated instances of models. */
+#include <limits.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -418,6 +419,22 @@ static const char *check_report(const scene_values *v)
     return NULL;
 }
 
+/* Returns true, after a message, if the output is the scene file or the file of a model. */
+static bool overwrites_input(const ebpo_scene *scene, const char *path, const char *out)
+{
+    const char *slash = strrchr(path, '/');
+    int folder = slash ? (int)(slash - path) + 1 : 0; /* models are relative to it */
+    ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
+    bool overwrites = command_overwrites("scene", path, out);
+    for (uint64_t i = 0; !overwrites && ebpo_scene_get_model_facts(scene, i, &m) == EBPO_OK; i++) {
+        char file[PATH_MAX];
+        bool is_absolute = *m.path == '/' || ebpo_is_url(m.path);
+        int length = snprintf(file, sizeof file, "%.*s%s", is_absolute ? 0 : folder, path, m.path);
+        overwrites = length < (int)sizeof file && command_overwrites("scene", file, out);
+    }
+    return overwrites;
+}
+
 static const struct {
     const char *name;
     ebpo_status (*run)(const scene_values *v, const char *path, ebpo_scene *scene,
@@ -492,6 +509,10 @@ static int run_scene(void *given, const char **operand)
     if (problem) {
         ebpo_scene_free(scene);
         return command_usage("scene", "%s", problem);
+    }
+    if (status == EBPO_OK && v->out && overwrites_input(scene, operand[1], v->out)) {
+        ebpo_scene_free(scene);
+        return EXIT_USAGE;
     }
     progress_line line;
     load.progress = progress_start(&line, "scene", v->quiet);

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any, Iterable, Literal, NamedTuple, Union
 import numpy as np
 
 from . import catalogue as cat
+from ._checked import doubles
 from .catalogue import Catalogue
 from .errors import ArgumentError
 from .open_models import process_models
@@ -89,7 +90,7 @@ def points(source: PointSet, dataset: str | None = None, *, chunk: int = CHUNK, 
     if isinstance(source, da.Array):
         return source.rechunk({1: source.shape[1]}) if source.ndim == 2 else source
     if not isinstance(source, (str, os.PathLike)):
-        values = np.asarray(source)
+        values = np.asanyarray(source)  # a masked array stays one
         if values.ndim != 2 or values.shape[1] != columns:
             raise ValueError(f"points have the shape (n, {columns}), not {values.shape}")
         return da.from_array(values, chunks=(chunk, columns))
@@ -119,7 +120,7 @@ class Means:
 def query_block(block: np.ndarray, what: str, models: Catalogue, means: Means, options: tuple,
                 block_info: Any = None) -> np.ndarray:
     """Run the queries of one chunk, in a worker. block_info: Dask's description of the chunk's position."""
-    block, query, rest = np.asarray(block), getattr(models, what), dict(options)
+    block, query, rest = np.asanyarray(block), getattr(models, what), dict(options)
     rows = (block[:, :3], block[:, 3:]) if what == "ray" else (block,)
     try:
         return query(*rows, **rest, **means.options)
@@ -196,7 +197,7 @@ def ray(model: Models, origins: DaskArray | ArrayLike, directions: DaskArray | A
     if isinstance(directions, da.Array) or np.ndim(directions) == 2:
         d = points(directions).rechunk((o.chunks[0], 3))
     else:
-        d = da.broadcast_to(da.from_array(np.asarray(directions, np.float64)), o.shape, chunks=o.chunks)
+        d = da.broadcast_to(da.from_array(doubles(directions, "directions")), o.shape, chunks=o.chunks)
     rays = da.concatenate([o, d], axis=1).rechunk({1: 6})
     return Hits(*members(query("ray", model, rays, t_max=t_max, nan=nan, chunk=chunk, memory=memory, threads=threads,
                                http=http)))
