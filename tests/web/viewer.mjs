@@ -47,6 +47,8 @@ function makeModels() {
   writeFileSync(join(models, 'damaged.ebpo.h5'), damaged);
   const at = (name) => join(models, name);
   copyFileSync(join(work, 'red.ply'), at('mesh.ebpo.h5'));
+  writeFileSync(join(work, 'open.off'), `OFF\n8 5 0\n${corners.join('\n')}\n${sides.slice(0, 5).map((s) => `4 ${s}\n`).join('')}`);
+  run(ebpo, ['convert', '-q', join(work, 'open.off'), at('open.ebpo.h5')]);
   plates(join(work, 'plates.ply'));
   run(ebpo, ['convert', '-q', join(work, 'plates.ply'), at('plates.ebpo.h5')]);
   run(ebpo, ['paint', at('plates.paint.h5'), at('plates.ebpo.h5'), '--new-layer', 'x', '--colour', 'ff0000', '--path', '-', '--radius', '0.4'], '-0.2 0.5 0.05\n');
@@ -921,6 +923,26 @@ async function together(browser, address) {
   await wrong.close();
 }
 
+// A switch shows the caps of a mesh with holes in red. Models without holes have no such switch.
+async function showsCaps(browser, address, plainPage) {
+  const page = await show(browser, `${address}?file=models/open.ebpo.h5&view=35,30,4`);
+  const red = async () => {
+    await settled(page);
+    return (await look(page)).orange;
+  };
+  assert.equal(await red(), 0);
+  assert.ok(await page.isVisible('#capsRow') && !await plainPage.isVisible('#capsRow'));
+  await page.keyboard.press('h');
+  const share = await red();
+  assert.ok(share > 0.15 && share < 0.6, `${share} of the picture is red`);
+  await page.waitForFunction(() => /show=caps/.test(location.search));
+  await page.goto(page.url());
+  assert.equal(await red(), share, 'the link shows the caps');
+  await page.keyboard.press('h');
+  assert.equal(await red(), 0, 'without caps');
+  await page.close();
+}
+
 // A link contains the theme and the switches of shading, wireframe and cells.
 async function sharesSwitches(browser, address) {
   const page = await show(browser, `${address}?file=models/small.ebpo.h5&level=3`);
@@ -1111,6 +1133,7 @@ async function main() {
   await step('point queries agree with the library', () => point(page));
   await step('a click queries the visible point', () => click(page));
   await step('faces have the model\'s colours, with a switch', () => modelColours(browser, address, page));
+  await step('caps of holes are shown', () => showsCaps(browser, address, page));
   await step('a Boolean result has the colours of its operands', () => operandColours(browser, address));
   requests();
   await step('a file from disk is shown without a server', () => fromDisk(page));

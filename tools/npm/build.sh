@@ -202,5 +202,6 @@ mkdir -p "$deps/include"
 }
 folders='core|geometry|io|hdf5_read|hdf5_write|mesh|format'
 build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
-build_library -small "$folders|levels_surface" -Os # for the viewers' module, whose size delays the first picture
+# For the viewers' module, whose size delays the first picture.
+build_library -small "$folders|levels_surface|derive_mesh" -Os
 build_package

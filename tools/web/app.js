@@ -145,6 +145,7 @@ const handlers = {
   },
   opened(m) {
     $('ownRow').hidden = !m.coloured;
+    $('capsRow').hidden = !m.info.parts.has('border') || m.info.parts.has('pruned');
     Object.assign(state, { info: m.info, scene: m.scene, bytesTo: m.bytesTo, size: m.size, traffic: m.traffic });
     const i = m.info, name = state.shownName ?? m.name;
     $('openingText').textContent = `${count(i.face_count)} faces`;
@@ -174,7 +175,7 @@ const handlers = {
       state.shownAfter ??= m.ms;
       showOpening();
     }
-    Object.assign(state, { stats: m.stats, traffic: m.traffic });
+    Object.assign(state, { stats: m.stats ?? state.stats, traffic: m.traffic });
     showLevels();
     showStats(scene.cellFaces);
   },
@@ -255,7 +256,7 @@ function requestCut() {
     busy(true);
   worker.postMessage({ type: 'view', view: scene.view(), want: {
     number: ++state.want, level, mesh: Boolean(mesh), surface, pixels: detail(), triangles: detail() === 0 ? Infinity : TRIANGLES_MOST,
-    black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked } });
+    black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked, caps: $('caps').checked } });
 }
 
 // Automatic detail begins with 16 pixels. When this detail is complete, it changes to 8 pixels if frames are fast, and to 32 pixels if frames are slow.
@@ -377,7 +378,7 @@ $('cellFaces').onchange = () => {
   changed();
 };
 $('own').onchange = () => scene.setOwnColours($('own').checked);
-$('wire').onchange = $('cells').onchange = () => {
+$('wire').onchange = $('cells').onchange = $('caps').onchange = () => {
   requestCut();
   changed();
 };
@@ -454,7 +455,7 @@ const slide = (id, step, then) => () => {
   then();
 };
 const KEYS = {
-  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('cellFaces'), w: click('wire'), c: click('cells'), m: click('own'),
+  arrowleft: slide('level', -1, levelChanged), arrowright: slide('level', 1, levelChanged), g: click('cellFaces'), w: click('wire'), c: click('cells'), m: click('own'), h: click('caps'),
   k: () => choose('colouring', 1), x: () => choose('clip', 1), '[': slide('clipAt', -15, cutChanged), ']': slide('clipAt', 15, cutChanged), '/': click('clipFlip'),
   v: click('ortho'), z: click('zUp'), s: click('turn'), f: click('toolHome'), t: click('toolTheme'), p: click('toolPanel'), '?': click('toolHelp'), o: close,
   ',': slide('level', -1, levelChanged), '.': slide('level', 1, levelChanged),

@@ -102,6 +102,11 @@ class ModelFile {
     return this.#named(this.view.surface(wanted, place));
   }
 
+  /** Reads the caps of a surface with holes, as View.caps(). */
+  caps(place) {
+    return this.#named(this.view.caps(place));
+  }
+
   close() {
     this.view.dispose();
   }

@@ -24,8 +24,8 @@ export function addShading(scene, pipeline, changed) {
   applyShown(wordsOf(new URLSearchParams(location.search)));
 }
 
-// Identifiers of the panel's switches, by their words in the address: show=depth,occlusion,wireframe,cells,orthographic,z-up.
-const SWITCHES = { depth: 'dome', occlusion: 'ambient', wireframe: 'wire', cells: 'cells', orthographic: 'ortho', 'z-up': 'zUp' };
+// Identifiers of the panel's switches, by their words in the address: show=depth,occlusion,wireframe,cells,caps,orthographic,z-up.
+const SWITCHES = { depth: 'dome', occlusion: 'ambient', wireframe: 'wire', cells: 'cells', caps: 'caps', orthographic: 'ortho', 'z-up': 'zUp' };
 /** Returns the words of the parameter `show`. */
 export const wordsOf = (query) => (query.get('show') ?? '').split(',');
 

@@ -4,6 +4,8 @@ import { REAL_FACE } from './tile.js';
 import { LEAF } from './tree.js';
 
 export const KEY = 'surface';      // key of the tile
+export const CAPS = 'caps';        // key of the tile with the caps
+const CAP_COLOUR = [214, 64, 51, 0];
 const CELL_PIXELS = 16;            // normal detail
 const ERROR = 2;                   // allowed error in pixels at normal detail; most of a patch is much closer to the model
 const TRIANGLES = 150_000;         // most triangles at this detail; twice as many at half of the pixels, which fast machines draw
@@ -107,14 +109,26 @@ export class Surface {
   }
 
   /** Makes the tile of a mesh by View.surface(), as the tiles of tile.js. `lines`: with the edges of triangles. */
-  tileOf({ position, normal, hue, index, triangles, faces }, lines) {
-    const count = position.length / 3, tag = new Uint8Array(4 * count);
-    for (let i = 0; i < tag.length; i += 4) {
-      tag[i + 1] = LEAF | REAL_FACE;
-      tag[i + 2] = 255;
-    }
-    return { key: KEY, position, tag, normal, hue, index, inner: triangles, lines: lines ? edgesOf(index) : undefined, triangles, meshTriangles: faces, cellFaceTriangles: 0 };
+  tileOf(mesh, lines) {
+    return tileOf(KEY, mesh, lines);
   }
+}
+
+function tileOf(key, { position, normal, hue, index, triangles, faces }, lines) {
+  const count = position.length / 3, tag = new Uint8Array(4 * count);
+  for (let i = 0; i < tag.length; i += 4) {
+    tag[i + 1] = LEAF | REAL_FACE;
+    tag[i + 2] = 255;
+  }
+  return { key, position, tag, normal, hue, index, inner: triangles, lines: lines ? edgesOf(index) : undefined, triangles, meshTriangles: faces, cellFaceTriangles: 0 };
+}
+
+/** Makes the tile of a mesh by View.caps(). */
+export function capsTile(mesh) {
+  const hue = new Uint8Array(4 * mesh.position.length / 3);
+  for (let i = 0; i < hue.length; i += 4)
+    hue.set(CAP_COLOUR, i);
+  return tileOf(CAPS, { ...mesh, hue });
 }
 
 // Returns each edge of triangles once, except edges with one triangle, of which half may be missing.

@@ -9,7 +9,7 @@ import { addLevels, growForView } from './grow.js';
 import { HEAD_BYTES, openModel } from './model_file.js';
 import { viewModule } from './ebpo/view.js'; // workers have no import maps
 import { UrlSource, sourceOf } from './source.js';
-import { KEY, Surface } from './surface.js';
+import { CAPS, KEY, Surface, capsTile } from './surface.js';
 import { Tree } from './tree.js';
 
 const LINE_MS = 250;                      // interval between reports of progress to the page
@@ -107,10 +107,32 @@ class OpenFile {
     }
   }
 
+  // Draws or removes the caps of a surface with holes.
+  #showCaps() {
+    const wanted = Boolean(this.slot.want?.caps) && this.file.info.parts.has('border') && !this.file.info.parts.has('pruned');
+    if (wanted === Boolean(this.caps))
+      return;
+    const caps = this.caps = wanted ? { loading: true } : undefined, isOld = () => this.ended || this.caps !== caps;
+    if (!wanted) {
+      this.#send({ set: [], removed: [CAPS], stats: this.stats });
+      return;
+    }
+    this.#later(this.file.caps(this.cut.scene).then((mesh) => {
+      caps.loading = false;
+      if (!isOld())
+        this.#send({ set: [capsTile(mesh)], removed: [], stats: this.stats });
+    }, (error) => {
+      if (!isOld())
+        this.caps = undefined; // the next view tries again
+      throw error;
+    }));
+  }
+
   async #refine() {
     let result;
     do {
       this.again = false;
+      this.#showCaps();
       if (this.#drawsSurface()) {
         result = await this.#refineSurface();
         continue;
@@ -124,7 +146,7 @@ class OpenFile {
         this.#later(this.#loadMesh(result.leaves));
       await new Promise((done) => setTimeout(done)); // handles a newer view first
     } while (!this.ended && (this.again || result.more));
-    if (!this.ended && !this.busy.level && !this.busy.nodes && !this.busy.mesh)
+    if (!this.ended && !this.busy.level && !this.busy.nodes && !this.busy.mesh && !this.caps?.loading)
       post(this.slot, { type: 'idle', opening: this.number, want: this.slot.want.number, traffic: this.file.traffic, deeper: result.deeper });
   }
 
@@ -205,6 +227,7 @@ class OpenFile {
     if (this.leaving) // the surface's tile goes with the first envelopes
       removed = [...removed, KEY];
     this.leaving = false;
+    this.stats = stats;
     const transfer = set.flatMap((t) => [t.position.buffer, t.tag.buffer, t.normal.buffer, t.hue?.buffer, t.index.buffer, t.lines?.buffer, t.cells?.buffer]).filter(Boolean);
     post(this.slot, { type: 'tiles', opening: this.number, set, removed, stats, traffic: this.file.traffic, ms: performance.now() - this.began, want: this.slot.want.number }, transfer);
   }

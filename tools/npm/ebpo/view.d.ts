@@ -33,6 +33,8 @@ export class View {
   leafFaces(leaves: LeafAddress[], options?: QueryOptions): Promise<LeafFaces[]>;
   patches(options?: QueryOptions): Promise<SurfacePatch[]>;
   surface(wanted: { patch: number; faces: boolean }[], options: QueryOptions & { center: number[]; scale: number }): Promise<DrawnSurface>;
+  /** The triangles that close the holes of a surface with the part `border`. */
+  caps(options: QueryOptions & { center: number[]; scale: number }): Promise<DrawnSurface>;
   levelBytes(options?: QueryOptions): Promise<Float64Array>;
   dispose(): void;
 }

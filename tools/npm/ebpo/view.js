@@ -131,6 +131,11 @@ export class View extends Model {
     return this.#read({ name: 'ebpo_js_surface', numbers, columns: 2, skipped: place.length, signal, read: surfaceOf });
   }
 
+  /** Reads the triangles that close the holes of a surface with the part `border`; like surface(), with flat normals and no colours. */
+  caps({ center, scale, signal }) {
+    return this.#read({ name: 'ebpo_js_caps', numbers: [...center, scale], signal, read: surfaceOf });
+  }
+
   /** Returns the number of bytes of the file for levels 0 to i. */
   levelBytes({ signal } = {}) {
     return this.#results((heap, object) => heap.call('ebpo_js_level_bytes', object), (array) => array(0, Float64Array), signal);

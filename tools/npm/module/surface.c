@@ -1,5 +1,6 @@
-/* Reads the simplified surface for drawing, for the WebAssembly module of viewers. The viewer
- * chooses patches by the table, and gets one mesh in the form in which it is drawn. */
+/* Reads the simplified surface, and the caps of a surface with holes, for drawing, for the
+ * WebAssembly module of viewers. The viewer chooses patches by the table, and gets one mesh in the
+ * form in which it is drawn. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,7 +49,7 @@ int EBPO_JS(ebpo_js_patches)(ebpo_js_object *object)
     return EBPO_OK;
 }
 
-/* Result arrays of ebpo_js_surface. */
+/* Result arrays of ebpo_js_surface and ebpo_js_caps. */
 enum {
     /* double [2]: number of triangles, and number of those that are faces of the model */
     MESH_FACTS,
@@ -157,5 +158,50 @@ int EBPO_JS(ebpo_js_surface)(ebpo_js_object *object, const double *place, uint32
         status = make_mesh(object, place, patches, drawn, patches + count, count - drawn);
     }
     free(patches);
+    return status;
+}
+
+/* Puts triangles with separate vertices, each with the normal of its triangle. */
+static ebpo_status put_flat(ebpo_js_object *object, const ebpo_mesh *mesh, const double *place)
+{
+    uint64_t count = 3 * mesh->face_count;
+    double facts[2] = { (double)mesh->face_count, 0 };
+    float(*position)[3] = ebpo_js_extend(object, MESH_POSITIONS, count, sizeof *position);
+    int16_t(*normal)[2] = ebpo_js_extend(object, MESH_NORMALS, count, sizeof *normal);
+    uint32_t *index = ebpo_js_extend(object, MESH_TRIANGLES, count, sizeof *index);
+    if (!position || !normal || !index)
+        return EBPO_E_MEMORY;
+    for (uint64_t i = 0; i < count; i++) {
+        index[i] = (uint32_t)i;
+        for (uint64_t k = 0; k < 3; k++) {
+            uint64_t at = 3 * (uint64_t)mesh->faces[i] + k;
+            double x = mesh->xyz64 ? mesh->xyz64[at] : (double)mesh->xyz32[at];
+            position[i][k] = (float)((x - place[k]) * place[3]);
+        }
+    }
+    for (uint64_t i = 0; i < count; i += 3) {
+        float u[3], v[3], n[3];
+        for (int k = 0; k < 3; k++) {
+            u[k] = position[i + 1][k] - position[i][k];
+            v[k] = position[i + 2][k] - position[i][k];
+        }
+        for (int k = 0; k < 3; k++)
+            n[k] = u[(k + 1) % 3] * v[(k + 2) % 3] - u[(k + 2) % 3] * v[(k + 1) % 3];
+        for (int corner = 0; corner < 3; corner++)
+            put_normal(n, normal[i + (uint64_t)corner]);
+    }
+    return ebpo_js_put(object, MESH_FACTS, facts, sizeof facts);
+}
+
+/* Reads the caps of the file's border. `place`: as above; `count` is not used. */
+int EBPO_JS(ebpo_js_caps)(ebpo_js_object *object, const double *place, uint32_t count)
+{
+    ebpo_mesh mesh = { 0 };
+    (void)count;
+    ebpo_js_clear(object);
+    ebpo_status status = ebpo_mesh_add_caps(&mesh, object->file, &object->error);
+    if (status == EBPO_OK)
+        status = put_flat(object, &mesh, place);
+    ebpo_mesh_free(&mesh);
     return status;
 }

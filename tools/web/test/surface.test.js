@@ -3,14 +3,28 @@ import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import { sceneOf } from '../cut.js';
+import { open } from '../ebpo/index.js';
 import { openModel } from '../model_file.js';
-import { Surface } from '../surface.js';
+import { Surface, capsTile } from '../surface.js';
 
 const view = { eye: [0.3, 0.4, 2], planes: [], pixels: 800 }, want = { pixels: 16, triangles: 2e6 };
 
+const bytesOf = (name) => readFileSync(new URL(`../../../format-spec/vectors/passed/${name}.ebpo.h5`, import.meta.url));
+
 async function load(name, small = false) {
-  const file = await openModel(readFileSync(new URL(`../../../format-spec/vectors/passed/${name}.ebpo.h5`, import.meta.url))), scene = sceneOf(file.info);
+  const file = await openModel(bytesOf(name)), scene = sceneOf(file.info);
   return { file, scene, surface: new Surface(file.info, scene, await file.patches(), small) };
+}
+
+// Returns true if triangles use each edge equally often in both directions. `place(vertex)`: equal for vertices at the same position.
+function isClosed(index, place) {
+  const edges = new Map();
+  for (let i = 0; i < index.length; i++) {
+    const a = place(index[i]), b = place(index[i % 3 === 2 ? i - 2 : i + 1]);
+    edges.set(`${a} ${b}`, (edges.get(`${a} ${b}`) ?? 0) + 1);
+    edges.set(`${b} ${a}`, (edges.get(`${b} ${a}`) ?? 0) - 1);
+  }
+  return [...edges.values()].every((n) => n === 0);
 }
 
 const sum = (list, of) => list.reduce((total, item) => total + of(item), 0);
@@ -66,15 +80,21 @@ test('a mesh has unit coordinates of the scene, colours and closed edges', async
     assert.equal(mesh.faces, sum(wanted, (w) => (w.faces ? surface.patches[w.patch].faces : 0)));
     assert.deepEqual([normal.length, hue.length], [2 * count, 4 * count]);
     assert.ok(position.every((x) => Math.abs(x) <= 1.01));
-    const edges = new Map(), place = (v) => position.subarray(3 * v, 3 * v + 3).join();
-    for (let i = 0; i < index.length; i++) {
-      const a = place(index[i]), b = place(index[i % 3 === 2 ? i - 2 : i + 1]);
-      edges.set(`${a} ${b}`, (edges.get(`${a} ${b}`) ?? 0) + 1);
-      edges.set(`${b} ${a}`, (edges.get(`${b} ${a}`) ?? 0) - 1);
-    }
-    assert.ok([...edges.values()].every((n) => n === 0), 'each edge has an opposite one');
+    assert.ok(isClosed(index, (v) => position.subarray(3 * v, 3 * v + 3).join()), 'each edge has an opposite one');
     const tile = surface.tileOf(mesh, true);
     assert.equal(tile.tag.length, 4 * count);
     assert.ok(tile.lines.length > mesh.triangles && tile.lines.length % 2 === 0);
+  }
+});
+
+test('caps close the holes of a mesh', async () => {
+  for (const name of ['65_border', '66_border_doubles', '67_border_with_subtrees', '73_inside_with_subtrees']) {
+    const { center, scale } = sceneOf((await openModel(bytesOf(name))).info), { vertices, faces } = await (await open(bytesOf(name))).mesh();
+    const caps = await (await openModel(bytesOf(name))).caps({ center, scale }), tile = capsTile(caps), first = vertices.length / 3;
+    const position = [...Array.from(vertices, (x, i) => Math.fround((x - center[i % 3]) * scale)), ...caps.position];
+    const place = (v) => position.slice(3 * v, 3 * v + 3).join();
+    assert.ok(caps.triangles > 0 && !isClosed(faces, place), name);
+    assert.ok(isClosed([...faces, ...Array.from(caps.index, (v) => first + v)], place), name);
+    assert.deepEqual([tile.hue.length, tile.tag.length, tile.triangles], [12 * caps.triangles, 12 * caps.triangles, caps.triangles]);
   }
 });
