@@ -200,6 +200,9 @@ class Files(Case):
         rows = ed.query("distance", "scan.ebpo.h5", P[:4000], chunk=1500)
         ed.to_file(rows, "nearest.npy", scheduler="sync")
         np.testing.assert_array_equal(np.load("nearest.npy"), rows.compute())
+        matrix = np.arange(24.).reshape(6, 4)  # chunks of columns as well
+        ed.to_file(dask.array.from_array(matrix, chunks=(3, 2)), "matrix.npy", scheduler="sync")
+        np.testing.assert_array_equal(np.load("matrix.npy"), matrix)
         ed.to_file(inside, "folder")
         parts = sorted(pathlib.Path("folder").glob("*.npy"))
         np.testing.assert_array_equal(np.concatenate([np.load(part) for part in parts]), model("scan").inside(P))

@@ -330,7 +330,8 @@ enum { VIEW_STEPS = 16 };
 typedef struct view_search {
     ebpo_scene_needs *needs;
     const ebpo_scene_camera *camera;
-    double pixel; /* width of a pixel at a distance of 1 */
+    double pixel;          /* width of a pixel in the middle of the picture, at a distance of 1 */
+    double corner_stretch; /* stretch_of at the corners of the picture */
 } view_search;
 
 /* Computes a box that contains the camera's eye at all times between two times. No key of the
@@ -409,6 +410,32 @@ static bool is_behind(const view_search *s, const ebpo_scene_bounds *box)
     return c->route == EBPO_SCENE_NONE && most < 0;
 }
 
+/* Returns how many times more pixels a cell of the box may cover than a cell in the middle of the
+ * picture at the same distance. At an angle a from the camera's axis it is 1 / cos^2 a. The angle
+ * is greatest at a corner of the box, or at a corner of the picture. */
+static double stretch_of(const view_search *s, const ebpo_scene_bounds *box)
+{
+    const ebpo_scene_camera *c = s->camera;
+    double axis[3], at[3], most = 1;
+    for (int k = 0; k < 3; k++)
+        axis[k] = c->target[k] - c->eye[k];
+    double length = ebpo_scene_length_above(axis);
+    for (int corner = 0; corner < 8 && c->route == EBPO_SCENE_NONE; corner++) {
+        double depth = 0;
+        for (int k = 0; k < 3; k++) {
+            at[k] = (corner >> k & 1 ? box->max[k] : box->min[k]) - c->eye[k];
+            depth += at[k] * (axis[k] / length);
+        }
+        double secant = ebpo_scene_length_above(at) / depth;
+        /* the comparison is false for NaN and infinity */
+        most = depth > 0 && secant * secant < s->corner_stretch ? fmax(most, secant * secant)
+                                                                : s->corner_stretch;
+        if (most >= s->corner_stretch)
+            return s->corner_stretch;
+    }
+    return c->route == EBPO_SCENE_NONE ? most : s->corner_stretch;
+}
+
 /* Returns the first level whose cells have a diagonal of at most `size`; -1: no level before the
  * last one has such cells, so all levels are needed. */
 static int level_for(const ebpo_info *info, double size)
@@ -436,7 +463,8 @@ static ebpo_status add_instance_view(const view_search *s, uint64_t instance, do
     status = distance_between(s, instance, from, to, &distance, &scale);
     if (status != EBPO_OK)
         return status;
-    int level = level_for(ebpo_file_info(scene->files[file].file), distance * s->pixel / scale);
+    int level = level_for(ebpo_file_info(scene->files[file].file),
+                          distance * s->pixel / stretch_of(s, &box) / scale);
     if (!need->any || (need->last_level >= 0 && (level < 0 || level > need->last_level)))
         need->last_level = level;
     need->any = true;
@@ -475,7 +503,8 @@ ebpo_status ebpo_scene_add_views(ebpo_scene_needs *needs)
     for (uint64_t i = 0; i < needs->scene->cameras_count && status == EBPO_OK; i++) {
         const ebpo_scene_camera *c = &needs->scene->cameras[i];
         double half = c->fov * (3.14159265358979323846 / 360); /* half of the field of view, rad */
-        view_search s = { needs, c, 2 * tan(half) / c->height };
+        double aspect = (double)c->width / c->height, side = tan(half);
+        view_search s = { needs, c, 2 * side / c->height, 1 + side * side * (1 + aspect * aspect) };
         status = add_views_along_route(&s);
         for (uint64_t f = 0; f < needs->scene->files_count; f++)
             needs->files[f].users++;

@@ -248,6 +248,7 @@ def to_file(results: DaskArray, path: str | os.PathLike[str], *, dataset: str = 
     if is_file and path.exists():
         raise FileExistsError(f"{path} already exists")
     folder = path.with_name(path.name + ".parts") if is_file else path
+    results = results.rechunk({axis: -1 for axis in range(1, results.ndim)})  # chunks of whole rows
     begin_parts(folder, results)
     blocks = results.to_delayed().ravel()
     names = [folder / f"{i:06d}.npy" for i in range(len(blocks))]
