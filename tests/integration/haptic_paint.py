@@ -81,8 +81,8 @@ class Device:
 
     def draw(self, process, seconds, step=None, kind=1):
         """Presses on the top of the cube and moves along x for some time, or until step(time) is true. Returns [(time, x)]."""
+        self.begin((0.1, 0.5, 1.2))
         begin, sent, down = time.monotonic(), [], None
-        self.send((0.1, 0.5, 1.2))
         while (now := time.monotonic() - begin) < seconds and process.poll() is None:
             z = max(1.2 - now, 1 - RADIUS / 2)
             if z < 1 and down is None:
