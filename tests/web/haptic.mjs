@@ -95,20 +95,31 @@ async function testRecording(tab) {
 }
 
 // A scene of two spheres and of a box, whose left side is beside the letter: the letter is on both spheres, as they share their paint, and not on the box.
-async function testScene(tab) {
-  const pose = { translation: [0.9, 0.9, 0.5], scale: 0.25, quaternion: [0, 0, 1, 1] }, side = at('side.json'), folder = at('paints');
+// `late`: the file of the spheres cannot be read until the letter is complete; then the device hovers.
+async function testScene(tab, paints, late) {
+  const pose = { translation: [0.9, 0.9, 0.5], scale: 0.25, quaternion: [0, 0, 1, 1] }, side = at('side.json'), folder = at(paints), source = '**/ball.ebpo.h5*';
   const box = { translation: [-0.28, 0, 0.8], scale: 0.4 };
   writeFileSync(side, JSON.stringify({ ebpo_scene: '1.0', models: { ball: { file: 'ball.ebpo.h5' }, box: { file: 'box.ebpo.h5' } }, cameras: [{ name: 'front', eye: [0, 0, 9],
     target: [0, 0, 0], up: [0, 1, 0] }], instances: [{ name: 'one', model: 'ball' }, { name: 'box', model: 'box', pose: box }, { name: 'two', model: 'ball', pose }] }));
-  const haptic = await deviceOn(page, side, '--path', at('letter.txt'), '--paint', folder, '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
+  const lines = letter().split('\n'), hover = Array(late ? 6000 : 0).fill(lines.at(-1));
+  writeFileSync(at('scene.txt'), [...lines, ...hover].join('\n'));
+  const haptic = await deviceOn(page, side, '--path', at('scene.txt'), '--paint', folder, '--pen-radius', String(RADIUS), '--full-force', '4', '--colour', '00a03c');
+  if (late)
+    await tab.route(source, (route) => route.abort());
   await tab.goto(`${haptic.address}?scene=scene.json&live=live&view=-40,0,1.7`);
   await idle(tab);
   const programs = () => tab.evaluate(() => window.ebpoViewer.scene.renderer.info.programs.length), compiled = await programs();
+  if (late) {
+    await tab.waitForFunction(() => window.ebpoViewer.paint.files.ball?.strokes[0]?.points.length > 40, undefined, TIMEOUT);
+    await tab.unroute(source);
+    await tab.click('#errorRetry');
+  }
   await tab.waitForFunction(() => window.ebpoViewer.live.ended, undefined, TIMEOUT);
-  assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
-  const { code, report, err } = await haptic.ended, file = strokesOf('paints/ball.paint.h5');
+  if (!late)
+    assert.equal(await programs(), compiled, 'a shader was compiled only when the device painted');
+  const { code, report, err } = await haptic.ended, file = strokesOf(`${paints}/ball.paint.h5`);
   assert.equal(code, 0, err);
-  assert.deepEqual([report.paint.strokes, file.length, strokesOf('paints/box.paint.h5').length], [1, 1, 0]);
+  assert.deepEqual([report.paint.strokes, file.length, strokesOf(`${paints}/box.paint.h5`).length], [1, 1, 0]);
   const shown = await tab.evaluate(() => window.ebpoViewer.paint.files);
   assert.deepEqual(Object.keys(shown).sort(), ['ball', 'box']);
   assert.deepEqual([bare(shown.ball.strokes), shown.box.strokes], [bare(file), []]);
@@ -230,11 +241,12 @@ try {
   const tab = await browser.newPage({ viewport: { width: 480, height: 360 } }), complaints = [];
   tab.on('pageerror', (e) => complaints.push(e.stack));
   const delay = await testRecording(tab);
-  await testScene(tab);
+  await testScene(tab, 'paints', false);
+  await testScene(tab, 'late', true);
   await testMouse(tab);
   await testLostPage(tab);
   assert.deepEqual(complaints, []);
-  console.log(`OK: a recording, a scene, the mouse, a lost page; ${Math.round(delay)} ms from contact to drawing`);
+  console.log(`OK: a recording, scenes, the mouse, a lost page; ${Math.round(delay)} ms from contact to drawing`);
 } finally {
   await browser.close();
   rmSync(work, { recursive: true, force: true });

@@ -157,7 +157,8 @@ export function addLive({ scene, query }, pen) {
     for (const name of ['pointerdown', 'pointermove', 'pointerup'])
       $('canvas').parentElement.addEventListener(name, move, { capture: true });
     pen.begin(command);
-    pen.warmUp(); // the device begins when this page is connected
+    pen.decals.warmUp(scene); // the device begins when this page is connected
+    pen.draw();
     connect();
     addEventListener('pagehide', () => source.close());
     window.ebpoViewer.live = live;

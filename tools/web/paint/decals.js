@@ -197,6 +197,15 @@ export class Decals {
     return mesh;
   }
 
+  /** Draws points of all kinds without size, and the probe, so that no shader is compiled later. Replaces the layers. */
+  warmUp(scene) {
+    const points = [{ centre: [0, 0, 0], share: 0 }, { centre: [0, 0, 0], share: 0, faces: new Float32Array(9) }];
+    this.set([{ opacity: 1, strokes: [255, 128].map((alpha) => ({ erases: false, colour: [0, 0, 0, alpha], radius: 0, points })) }]);
+    scene.showProbe([0, 0, 0], [0, 0, 0]);
+    scene.draw();
+    scene.showProbe();
+  }
+
   /** Draws all layers into a texture: sRGB, premultiplied by alpha. */
   render(renderer, camera, depths, size) {
     const { kit } = this, target = () => new kit.WebGLRenderTarget(size.x, size.y, { depthBuffer: false });

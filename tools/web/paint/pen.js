@@ -188,16 +188,6 @@ export function addPen({ scene, worker, query }, pipeline) {
       draw();
   }
 
-  // Draws points of all kinds without size, and the probe, so that the shaders are compiled before the device paints.
-  function warmUp() {
-    const points = [{ centre: [0, 0, 0], share: 0 }, { centre: [0, 0, 0], share: 0, faces: new Float32Array(9) }];
-    decals.set([{ opacity: 1, strokes: [255, 128].map((alpha) => ({ erases: false, colour: [0, 0, 0, alpha], radius: 0, points })) }]);
-    scene.showProbe([0, 0, 0], [0, 0, 0]);
-    scene.draw();
-    scene.showProbe();
-    draw();
-  }
-
   // Lets the device do what the buttons of the pen otherwise do on this page.
   function beginLive(send) {
     command = send;
@@ -337,5 +327,5 @@ export function addPen({ scene, worker, query }, pipeline) {
     fromAddress();
     window.ebpoViewer.paint = { get file() { return doc.file; }, get pending() { return pending; }, openBytes, write: () => writePaint(doc.file) };
   }
-  return { begin, drawing, live: { begin: beginLive, receive, warmUp } };
+  return { begin, drawing, live: { begin: beginLive, receive, decals, draw } };
 }

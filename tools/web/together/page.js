@@ -91,6 +91,7 @@ class Together {
       this.#rows();
       this.#marks();
       this.moved();
+      this.painted?.retry();
     };
     showError({ message: `${model.name}: ${error.message}` }, error.code === 'NETWORK' && state.info ? again : undefined);
   }

@@ -10,12 +10,12 @@ import { $, state, toScene, upright } from '../state.js';
 const FULL_SIZE = 32768, AT_ONCE = 200, NEAR_PIXELS = 24; // NEAR_PIXELS: between a face and an envelope that is drawn for it
 const HTML = `${ROWS}<p class="hint" id="paintText" role="status"></p><div class="buttons"><button id="layerAdd" class="small">Add a layer</button></div>`;
 
-/** Returns { begin(command), receive(news), warmUp() } for live.js, and draw(), to be called when other instances are visible. */
+/** Returns { begin(command), receive(news), decals } for live.js; draw(), to be called when other instances are visible; and retry(), when models were opened late. */
 export function addPainted({ scene, assembly, pipeline }) {
   const decals = pipeline.layers = new Decals(kit), paints = new Map(), reaches = new WeakMap(); // { layers, strokes } by a model's name; { normal, faces } by a point
   const made = new Map(); // WeakMaps for splitStroke() by an instance
   let command, details;
-  const isSolid = assembly.models.every((model) => model.info?.solid !== false), isAlone = assembly.instances.length === 1;
+  const isAlone = assembly.instances.length === 1;
   decals.near = () => (assembly.stats.meshTriangles === assembly.stats.triangles ? 0 : NEAR_PIXELS);
 
   // Returns the decals of a model's layers on an instance.
@@ -33,7 +33,7 @@ export function addPainted({ scene, assembly, pipeline }) {
 
   function draw() {
     const shown = assembly.instances.filter(({ model, visible, now }) => visible && now && assembly.models[model].visible && paints.has(assembly.models[model].name));
-    decals.set(shown.flatMap(layersOf), isSolid);
+    decals.set(shown.flatMap(layersOf), assembly.models.every((model) => model.info?.solid !== false));
     scene.redraw();
   }
 
@@ -46,6 +46,21 @@ export function addPainted({ scene, assembly, pipeline }) {
     }
   }
 
+  // Matches the points with the faces of their model, and draws them.
+  async function match(model, strokes) {
+    try {
+      if (model?.info)
+        await findReach(model, strokes);
+      draw();
+    } catch (error) {
+      if (error.name !== 'AbortError')
+        complain(error.message);
+    }
+  }
+
+  const isUnmatched = (p) => !reaches.has(p), unmatched = (name) => (paints.get(name)?.strokes ?? []).map((s) => ({ ...s, points: s.points.filter(isUnmatched) }));
+  const retry = () => Promise.all(assembly.models.map((model) => match(model, unmatched(model.name))));
+
   async function receive({ model: name, count, layers, strokes: parts }) {
     if (!details)
       addRows();
@@ -54,24 +69,7 @@ export function addPainted({ scene, assembly, pipeline }) {
     paints.set(name, { layers: layers ?? before.layers, strokes });
     $('paintText').textContent = [...paints].filter((one) => one[1].strokes.length).map(([n, one]) => `${n}: ${one.strokes.length} ${one.strokes.length === 1 ? 'stroke' : 'strokes'}`).join(', ');
     draw();
-    try {
-      if (model?.info)
-        await findReach(model, fresh);
-      draw();
-    } catch (error) {
-      if (error.name !== 'AbortError')
-        complain(error.message);
-    }
-  }
-
-  // Draws points of all kinds without size, and the probe, so that the shaders are compiled before the device paints.
-  function warmUp() {
-    const points = [{ centre: [0, 0, 0], share: 0 }, { centre: [0, 0, 0], share: 0, faces: new Float32Array(9) }];
-    decals.set([{ opacity: 1, strokes: [255, 128].map((alpha) => ({ erases: false, colour: [0, 0, 0, alpha], radius: 0, points })) }]);
-    scene.showProbe([0, 0, 0], [0, 0, 0]);
-    scene.draw();
-    scene.showProbe();
-    draw();
+    await match(model, fresh);
   }
 
   function addRows() {
@@ -86,7 +84,7 @@ export function addPainted({ scene, assembly, pipeline }) {
     command = send;
     window.ebpoViewer.paint = { get files() { return Object.fromEntries(paints); } };
   }
-  return { begin, receive, warmUp, draw };
+  return { begin, receive, decals, draw, retry };
 }
 
 const corners = (faces) => Array.from({ length: faces.length / 3 }, (_, i) => [...faces.subarray(3 * i, 3 * i + 3)]);
