@@ -46,7 +46,7 @@ def play(ebpo, folder, send, paint, *more):
 def push(connection, still=1.5):
     """Press down on the front of the cube, in events whose bytes arrive in pieces, turn, then hold the cap still.
 
-    Half of the time to press suffices, as the loop of a busy machine may begin after the first events.
+    The test holds if only half of the pressing is felt: on a busy machine, the loop may begin after the first events.
     """
     for i in range(200):
         event = motion(z=350)

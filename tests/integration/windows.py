@@ -215,8 +215,8 @@ def main():
     shutil.rmtree(FOLDER / "unpacked", ignore_errors=True)
     zipfile.ZipFile(archive).extractall(FOLDER / "unpacked")
     WINDOWS = [WINE, str(next(FOLDER.glob("unpacked/*/bin/ebpo.exe")))]
-    # Wine's own processes stay, so that their messages are not those of the command. They keep the messages' pipe of the
-    # command that starts them open, so that one has none.
+    # Wine's own processes are started first and stay until the end. They keep the pipes of the command that starts them
+    # open, so that command gets no pipes.
     server = WINE.replace("wine64", "wineserver64")
     subprocess.run([server, "-p"], env=wine_environment(), check=False)
     subprocess.run([*WINDOWS, "--version"], env=wine_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,

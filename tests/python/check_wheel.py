@@ -88,8 +88,9 @@ def check_musl(build, wheel):
             good &= check(f"conversion of {name}", ebpo, "convert", f"{name}.ply", output)
             results.append([pathlib.Path(output).read_bytes()] + [run(ebpo, query, "--json", f"{name}.ebpo.h5", input=points)
                                                                  for query in ("inside", "distance", "verify")])
-        print(f"  {'ok' if results[0] == results[1] else 'FAILED'}: file and results of {name} equal those of the build")
-        good &= results[0] == results[1]
+        equal = results[0] == results[1] and all(code == 0 for code, *_ in results[0][1:])
+        print(f"  {'ok' if equal else 'FAILED'}: file and results of {name} equal those of the build")
+        good &= equal
     return good
 
 

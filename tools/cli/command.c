@@ -6,6 +6,7 @@
 #include <sched.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -78,6 +79,24 @@ bool command_overwrites(const char *name, const char *in, const char *out)
         return false;
     fprintf(stderr, "ebpo %s: %s: is both input and output; choose another output\n", name, out);
     return true;
+}
+
+char *command_path_in_scene(const char *scene, const char *path)
+{
+    const char *last = strrchr(scene, '/');
+    bool is_absolute = *path == '/' || strstr(path, "://");
+#ifdef _WIN32
+    const char *other = strrchr(last ? last : scene, '\\');
+    last = other ? other : last;
+    is_absolute = is_absolute || *path == '\\' || (*path && path[1] == ':');
+#endif
+    size_t folder = last && !is_absolute ? (size_t)(last - scene) + 1 : 0, size = strlen(path);
+    char *joined = malloc(folder + size + 1);
+    if (joined) {
+        memcpy(joined, scene, folder);
+        memcpy(joined + folder, path, size + 1);
+    }
+    return joined;
 }
 
 /* Opens a regular file; never waits for data of a pipe. */

@@ -39,6 +39,10 @@ bool command_same_file(const char *a, const char *b);
  * The caller then exits with EXIT_USAGE. */
 bool command_overwrites(const char *name, const char *in, const char *out);
 
+/* Returns the path of a file that a scene names: relative to the scene's folder, or absolute, or a
+ * URL. Returns NULL without memory. The caller frees the path. */
+char *command_path_in_scene(const char *scene, const char *path);
+
 /* Returns 1 if the file begins with the signature of HDF5, and 0 if it begins with other bytes.
  * Returns -1, after a report on stderr, if the file cannot be read. Returns 1 also for a URL and
  * for a file that does not exist: the caller then opens the file, and reports the error. */

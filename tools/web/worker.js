@@ -122,8 +122,9 @@ class OpenFile {
       if (!isOld())
         this.#send({ set: [capsTile(mesh)], removed: [], stats: this.stats });
     }, (error) => {
-      if (!isOld())
-        this.caps = undefined; // the next view tries again
+      if (isOld())
+        return;
+      this.caps = undefined; // the next view tries again
       throw error;
     }));
   }

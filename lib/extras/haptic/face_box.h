@@ -74,7 +74,7 @@ bool ebpo_face_box_find(const ebpo_face_box *box, const ebpo_extent *around, uin
  * search visits no farther nodes. The bound is less accurate if the search ends because of
  * max_visits, the limit of visited nodes. Adds the number of visited nodes to *visits. *leaf: a
  * leaf that may be near, at which the search begins; any value is valid. It is set to the nearest
- * leaf that was visited. */
+ * leaf that was visited, if that one is nearer than `most`. */
 double ebpo_face_box_gap(const ebpo_face_box *box, const ebpo_extent *around, double most,
                          uint32_t max_visits, uint64_t *leaf, uint64_t *visits);
 

@@ -29,7 +29,7 @@ enum {
 
 /* A search for a distance ends at this multiple of the needed distance. A wider search saves later
  * searches for points that are far from faces, but visits more nodes. */
-static const double enough = 16;
+static const double search_multiple = 16;
 
 /* Distances in units of the skin. */
 static const double search_distance =
@@ -75,7 +75,7 @@ static void box_of_segment(const double p[3], const double q[3], double wide, eb
 
 /* Returns a lower bound of the distance of `e` from all faces. The bound is computed from the faces
  * of the box and the boundary of the loaded region, or from the box of the model. needed: the
- * caller needs to know if the distance is at least this. *leaf: see ebpo_face_box_gap. */
+ * distance from which on the caller need not examine faces. *leaf: see ebpo_face_box_gap. */
 static double free_distance(const tool_piece *p, const ebpo_extent *e, double needed,
                             uint32_t visits, uint64_t *leaf)
 {
@@ -87,7 +87,7 @@ static double free_distance(const tool_piece *p, const ebpo_extent *e, double ne
     for (int i = 0; i < 3; i++)
         inside = fmin(inside,
                       fmin(e->min[i] - p->box->loaded.min[i], p->box->loaded.max[i] - e->max[i]));
-    double gap = ebpo_face_box_gap(p->box, e, enough * needed, visits, leaf, p->work);
+    double gap = ebpo_face_box_gap(p->box, e, search_multiple * needed, visits, leaf, p->work);
     return fmax(out, fmin(inside, gap));
 }
 

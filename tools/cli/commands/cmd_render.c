@@ -142,8 +142,8 @@ static int parse_values(job *j)
         draws_level = draws_level || j->tiles[i].level != MESH;
     }
     if (v->surface && !draws_level)
-        return command_usage("render", "--surface applies to pictures of levels only; give --level "
-                                       "or --levels");
+        return command_usage("render", "--surface applies to pictures of levels only; give "
+                                       "--level, or a level in --levels");
     if (v->caps && !draws_mesh)
         return command_usage("render", "--caps applies to pictures of the mesh only");
     return EXIT_OK;

@@ -1,5 +1,5 @@
 /* ebpo scene: queries rigid and animated instances of models. */
-#include <limits.h>
+#include <stdlib.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -419,18 +419,17 @@ static const char *check_report(const scene_values *v)
     return NULL;
 }
 
-/* Returns true, after a message, if the output is the scene file or the file of a model. */
+/* Returns true, after a message, if the output is the scene file or the file of a model, or without
+ * memory. */
 static bool overwrites_input(const ebpo_scene *scene, const char *path, const char *out)
 {
-    const char *slash = strrchr(path, '/');
-    int folder = slash ? (int)(slash - path) + 1 : 0; /* models are relative to it */
     ebpo_scene_model_facts m = EBPO_SCENE_MODEL_FACTS_INIT;
     bool overwrites = command_overwrites("scene", path, out);
     for (uint64_t i = 0; !overwrites && ebpo_scene_get_model_facts(scene, i, &m) == EBPO_OK; i++) {
-        char file[PATH_MAX];
-        bool is_absolute = *m.path == '/' || ebpo_is_url(m.path);
-        int length = snprintf(file, sizeof file, "%.*s%s", is_absolute ? 0 : folder, path, m.path);
-        overwrites = length < (int)sizeof file && command_overwrites("scene", file, out);
+        char *file = command_path_in_scene(path, m.path);
+        overwrites =
+            file ? command_overwrites("scene", file, out) : command_no_memory("scene") != EXIT_OK;
+        free(file);
     }
     return overwrites;
 }

@@ -23,16 +23,6 @@ static ebpo_status fail_memory(ebpo_error *error, const haptic_scene *s)
     return fail_scene(error, EBPO_E_MEMORY, s->name, "not enough memory for the scene");
 }
 
-/* Returns the path of a model's file, whose path in the scene is relative to the scene's folder.
- * NULL without memory. The caller frees it. */
-static char *path_of(const haptic_scene *s, const char *model)
-{
-    const char *slash = strrchr(s->name, '/');
-    char *path = NULL;
-    int folder = slash ? (int)(slash - s->name) + 1 : 0;
-    return asprintf(&path, "%.*s%s", folder, s->name, model) < 0 ? NULL : path;
-}
-
 /* Sets *number to the index of the surface of a model. Adds the surface if it is new. */
 static ebpo_status find_surface(haptic_scene *s, uint64_t model, uint64_t *number,
                                 ebpo_error *error)
@@ -48,7 +38,7 @@ static ebpo_status find_surface(haptic_scene *s, uint64_t model, uint64_t *numbe
     ebpo_status status = ebpo_scene_model(s->scene, model, &surface->model, error);
     if (status != EBPO_OK)
         return status;
-    s->paths[s->surface_count] = path_of(s, facts.path);
+    s->paths[s->surface_count] = command_path_in_scene(s->name, facts.path);
     return s->paths[s->surface_count++] ? EBPO_OK : fail_memory(error, s);
 }
 
@@ -121,7 +111,7 @@ bool haptic_scene_overwrites(const haptic_scene *s, const char *record)
     for (uint64_t i = 0; i < counts.models; i++) {
         ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
         (void)ebpo_scene_get_model_facts(s->scene, i, &facts);
-        char *path = path_of(s, facts.path);
+        char *path = command_path_in_scene(s->name, facts.path);
         bool same = path && command_same_file(path, record);
         free(path);
         if (same) {

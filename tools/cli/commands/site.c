@@ -391,7 +391,7 @@ int site_show_scene(site *s, char *text)
                : command_no_memory(s->options.command);
 }
 
-/* Adds the list of models, and sets the address of the first page. */
+/* Adds the files of the viewer and the list of models, and sets the address of the first page. */
 int site_finish(site *s)
 {
     json j;

@@ -6,7 +6,7 @@
 The wheel contains the package, the library, the command `ebpo`, HDF5's plugin for zstd, the web viewer if it was built
 before (docs/guide/viewer.md), and all licences. HDF5, zstd, zlib, GMP, nettle and jansson are linked statically, with
 hidden symbols, so that other copies of them in the same process (h5py) are not affected. static_libraries.sh builds
-them, which takes minutes. EBPO_LIBRARIES names a folder that keeps them for later builds for the same C library.
+them, which takes minutes. EBPO_LIBRARIES names a folder that keeps them for later builds.
 
 pip installs meson, ninja and the compiler (ziglang), which links against glibc 2.28, or against musl where Python uses
 musl. With EBPO_LIBC=musl, a system with glibc builds the wheel for musl. The variable CC selects another compiler. The
@@ -77,7 +77,15 @@ def libc():
     name = os.environ.get("EBPO_LIBC") or ("gnu" if platform.libc_ver()[0] == "glibc" else "musl")
     if name not in ("gnu", "musl"):
         sys.exit(f"ebpo_wheel.py: EBPO_LIBC is {name!r}; set it to gnu or musl")
+    if os.environ.get("CC") and os.environ.get("EBPO_LIBC"):
+        sys.exit("ebpo_wheel.py: EBPO_LIBC is for Zig's compiler; omit it, or CC")
     return name
+
+
+def kept_libraries():
+    """Return the folder that keeps static libraries for later builds; None: they are not kept."""
+    folder = os.environ.get("EBPO_LIBRARIES")
+    return pathlib.Path(folder).absolute() / libc() if folder else None
 
 
 def package_in(folder):
@@ -245,7 +253,7 @@ def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     with tempfile.TemporaryDirectory(prefix="ebpo-wheel-") as name:
         folder = pathlib.Path(name)
-        libraries = pathlib.Path(os.environ.get("EBPO_LIBRARIES") or folder / "libraries").absolute()
+        libraries = kept_libraries() or folder / "libraries"
         build(folder / "build", libraries, setup_args(config_settings))
         return pack(folder / "build", wheel_directory, libraries)
 
@@ -278,8 +286,7 @@ def build_sdist(sdist_directory, config_settings=None):
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    libraries = os.environ.get("EBPO_LIBRARIES")
-    name = pack(sys.argv[1], sys.argv[2], libraries and pathlib.Path(libraries))
+    name = pack(sys.argv[1], sys.argv[2], kept_libraries())
     print(f"{sys.argv[2]}/{name}: {os.path.getsize(pathlib.Path(sys.argv[2]) / name)} bytes")
 
 
