@@ -291,13 +291,16 @@ static bool intersect_within_plane(const ebpo_segment *ray, const double triangl
 
 /* --- comparing --- */
 
-/* Computes out = e * f; returns false when `space` is too small. */
+enum { PRODUCT_SPACE = 512 };
+
+/* Computes out = e * f, which has space for PRODUCT_SPACE components; returns false when that is
+ * too small. work: space for twice as many, so that the stack need not hold it again. */
 static bool multiply_expansions(double *out, int *length, const double *e, int n, const double *f,
-                                int m, int space)
+                                int m, double *work)
 {
-    double sum[2][512], term[256];
+    double *sum[2] = { work, work + PRODUCT_SPACE }, term[256];
     int count = 0, now = 0;
-    if (2 * n * m > space || space > 512 || 2 * n > 256)
+    if (2 * n * m > PRODUCT_SPACE || 2 * n > 256)
         return false;
     for (int i = 0; i < m; i++) {
         int term_n = ebpo_expansion_scale(term, e, n, f[i]);
@@ -311,16 +314,16 @@ static bool multiply_expansions(double *out, int *length, const double *e, int n
 
 static int compare_fractions(fraction_of_expansions *a, fraction_of_expansions *b)
 {
-    double left[512], right[512], rest[1024];
+    double left[PRODUCT_SPACE], right[PRODUCT_SPACE], work[2 * PRODUCT_SPACE];
     int left_n, right_n;
     compress_fraction(a);
     compress_fraction(b);
-    if (!multiply_expansions(left, &left_n, a->numerator, a->n, b->denominator, b->m, 512) ||
-        !multiply_expansions(right, &right_n, b->numerator, b->n, a->denominator, a->m, 512))
+    if (!multiply_expansions(left, &left_n, a->numerator, a->n, b->denominator, b->m, work) ||
+        !multiply_expansions(right, &right_n, b->numerator, b->n, a->denominator, a->m, work))
         return EBPO_SIGN_UNKNOWN;
     ebpo_expansion_negate(right, right_n);
-    int n = ebpo_expansion_sum(rest, left, left_n, right, right_n);
-    return ebpo_expansion_sign(rest, n) * ebpo_expansion_sign(a->denominator, a->m) *
+    int n = ebpo_expansion_sum(work, left, left_n, right, right_n);
+    return ebpo_expansion_sign(work, n) * ebpo_expansion_sign(a->denominator, a->m) *
            ebpo_expansion_sign(b->denominator, b->m);
 }
 
