@@ -101,7 +101,7 @@ def main(ebpo, model, seconds="600"):
 ## Measurement
 
 Made by `python3 tests/bench/haptic_page.py EBPO {os.path.basename(model)} {seconds}` on {os.cpu_count()} cores. Each row is one run of
-`ebpo haptic --json`: the device circles the model in 8 seconds, into the surface and out of it. The haptic thread has
+`ebpo haptic --json`: the device circles the model in 8 seconds, into the surface and out. The haptic thread has
 {rows[0][2]["scheduling"]}; the loading thread has the default priority. *stolen*: CPU
 time that the host gave to other machines.
 

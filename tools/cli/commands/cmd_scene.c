@@ -1,8 +1,8 @@
 /* ebpo scene: queries rigid and animated instances of models. */
-#include <stdlib.h>
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "cli/command.h"
