@@ -11,7 +11,7 @@
 #include "cli/renamed.h"
 
 static const arg_option help_option = {
-    "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL
+    "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL, NULL
 };
 
 /* Prints a usage error. The macro's value is ARGS_WRONG. */
@@ -173,6 +173,7 @@ typedef struct parser {
     void *values;
     const char *output; /* value of the option --output, which stands for an operand; or NULL */
     size_t output_at;   /* index of the operand for which `output` stands */
+    uint64_t limited; /* bit i: the option spec->options[i] was given, and has the member `only` */
 } parser;
 
 /* Takes an option and its value. `joined`: the value, if it is in the same argument
@@ -184,6 +185,7 @@ static arg_result take_option(parser *p, const arg_option *o, const char *joined
         args_help(p->spec);
         return ARGS_HELPED;
     }
+    p->limited |= o->only ? UINT64_C(1) << (o - p->spec->options) : 0;
     if (o->kind == ARG_FLAG)
         return joined ? refuse_args(p->spec, "--%s takes no value", o->name)
                       : set_value(p->spec, o, NULL, p->values);
@@ -281,6 +283,16 @@ static arg_result add_output(const parser *p, const char **operands, int *count)
     return result;
 }
 
+/* Refuses a given option that cannot be used with the first operand. */
+static arg_result check_limited(const parser *p, const char *first)
+{
+    for (const arg_option *o = p->spec->options; o->name; o++)
+        if (o->only && p->limited >> (o - p->spec->options) & 1 && !is_among(o->only, first))
+            return refuse_args(p->spec, "--%s cannot be used with '%s', only with: %s", o->name,
+                               first, o->only);
+    return ARGS_RUN;
+}
+
 arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
                       const char *operands[ARGS_OPERANDS_MAX + 1])
 {
@@ -310,7 +322,7 @@ arg_result args_parse(const arg_spec *spec, int argc, char **argv, void *values,
     if (count < spec->least)
         return refuse_args(spec, "missing operand%s; expected: %s", count ? "" : "s",
                            spec->operands);
-    return ARGS_RUN;
+    return p.limited ? check_limited(&p, operands[0]) : ARGS_RUN;
 }
 
 /* --- help --- */

@@ -32,6 +32,8 @@ typedef struct arg_option {
     const char *const *words; /* values of ARG_WORD and ARG_SET, NULL-terminated */
     const char *page; /* name of the page of `ebpo help` that describes the option; NULL: --help
                        * describes it */
+    const char *only; /* the first operands with which the option can be used, such as "plan pack";
+                       * NULL: any */
 } arg_option;
 
 /* The values of a repeated option in the order of the command line. NULL follows the last value. */

@@ -49,7 +49,8 @@ def c_option(command, o):
     offset = o.field if o.kind == "operand" else f"offsetof({o.of or command.values}, {o.field})"
     return (f"    {{ {c_text(o.name)}, {letter}, ARG_{o.kind.upper()}, {offset},\n"
             f"      {c_text(o.value)}, {c_text(o.help)},\n"
-            f"      {o.low}, {o.high}, {o.array or 'NULL'}, {c_text(o.page)} }},")
+            f"      {o.low}, {o.high}, {o.array or 'NULL'}, {c_text(o.page)},\n"
+            f"      {c_text(' '.join(o.only))} }},")
 
 
 def c_check(command, o):

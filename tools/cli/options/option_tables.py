@@ -18,6 +18,7 @@ lines of mdoc for the man page:
                               the words, and the words
       help TEXT               short text for --help
       of TYPE                 struct of FIELD, if it is the first member of the command's struct
+      only WORD...            the first operands with which the option can be used; default: any
       key KEY                 in shared.options: name for `use`; default: NAME
     (mdoc)                    for the man page; default: the help
     use KEY...                shared options; mdoc is added after that of the last one
@@ -43,8 +44,9 @@ class Wrong(Exception):
 
 
 class Option:
-    """name, letter, value ('' for flags), kind, of, field, low, high, array, words, help, man, and page:
-    the page of `ebpo help` that describes the option, or '' for --help."""
+    """name, letter, value ('' for flags), kind, of, field, low, high, array, words, help, man, only: the
+    words of the first operand with which the option can be used, and page: the page of `ebpo help` that
+    describes the option, or '' for --help."""
 
     def __init__(self, **members):
         self.__dict__.update(members)
@@ -113,11 +115,13 @@ def read_option(where, head, facts, man):
     elif kind in ("word", "set"):
         more["array"], more["words"] = words[1], words[2:]
     for name, _ in facts:
-        if name not in KINDS + ("help", "key", "of"):
+        if name not in KINDS + ("help", "key", "of", "only"):
             raise Wrong(f"{where}: '{name}' unknown line of an option")
+    only = fact(where, facts, "only", "").split()
+    short = (", ".join(only) + ": " if only else "") + fact(where, facts, "help")
     return Option(where=where, name=head[1], letter=letter, value=" ".join(rest), kind=kind,
-                  field=words[0], help=fact(where, facts, "help"), of=fact(where, facts, "of", ""), man=man,
-                  page="", **more)
+                  field=words[0], help=short, of=fact(where, facts, "of", ""), man=man, only=only, page="",
+                  **more)
 
 
 class Shared:
@@ -193,7 +197,7 @@ def add_output(command):
     if at is None or any(o.name == OUTPUT for o in command.options()):
         return
     option = Option(where=command.name, name=OUTPUT, letter="o", value=names[at], kind="operand",
-                    field=str(at), of="", low="0", high="0", array="", words=[], page="",
+                    field=str(at), of="", low="0", high="0", array="", words=[], only=[], page="",
                     help=f"the output, in place of the operand {names[at]}",
                     man=["The output, in place of the operand", f".Ar {names[at]} ."])
     command.runs.insert(0, ([option], None))
@@ -223,6 +227,8 @@ def read_command(folder, name, shared):
             if mark in seen or mark in ("help", "h"):
                 raise Wrong(f"{option.where}: '{mark}' is defined twice")
             seen.add(mark)
+    if any(o.only for o in command.options()[64:]):
+        raise Wrong(f"{path}: options with a line 'only' must be among the first 64")
     return command
 
 
