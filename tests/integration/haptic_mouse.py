@@ -69,7 +69,7 @@ def main(ebpo):
         with open(ply, "w", encoding="ascii") as out:
             out.write(CUBE)
         subprocess.run([ebpo, "convert", "-q", ply, os.path.join(folder, "cube.ebpo.h5")], check=True)
-        got, poses = play(ebpo, folder, push, "p.paint.h5", "--seconds", "10")
+        got, poses = play(ebpo, folder, push, "p.paint.h5", "--seconds", "40")
         first, last = poses[0], poses[-1]
         assert first[:2] == last[1:2] * 2 and 1 < first[2] < 1.2 and first[3:] == [0, 0, 0, 1], first
         assert got["contacts"] > 100 and got["paint"]["strokes"] == 1 and last[2] < 0.9, (got, last)
@@ -81,7 +81,7 @@ def main(ebpo):
             connection.sendall(EVENT.pack(1, 0, 1, 0, 0, 0, 0, 0) + EVENT.pack(2, 0, 0, 0, 0, 0, 0, 0))
             push(connection, 0.1)
 
-        got, poses = play(ebpo, folder, lift, "q.paint.h5", "--seconds", "10")
+        got, poses = play(ebpo, folder, lift, "q.paint.h5", "--seconds", "40")
         assert got["contacts"] > 100 and got["paint"]["strokes"] == 0, got["paint"]
         none = os.path.join(folder, "none.paint.h5")  # not made without a daemon
         p = subprocess.run([ebpo, "haptic", "--device", "spacenav", "--paint", none, "--pen-radius", "0.02",

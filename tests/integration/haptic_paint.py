@@ -25,7 +25,7 @@ RADIUS, STIFFNESS = 0.02, 400
 
 def check(condition, *what):
     if not condition:
-        raise SystemExit("failed: " + " ".join(str(w) for w in what))
+        raise SystemExit(f"line {sys._getframe(1).f_lineno} failed: " + " ".join(str(w) for w in what))
 
 
 class Test:
@@ -168,7 +168,7 @@ def test_kill(t, faults):
     """After a kill, the file contains everything that was touched up to a second before, also if the disk is slow."""
     paint = t.at("killed.paint.h5")
     environment = {**os.environ, "LD_PRELOAD": faults, "EBPO_TEST_SLOW_DISK": "1"} if faults else None
-    p = t.start(paint, "--device", "udp:0", "--seconds", "5", env=environment)
+    p = t.start(paint, "--device", "udp:0", "--seconds", "40", env=environment)
     sent = Device(p).draw(p, 2.1)
     p.kill()
     killed = time.monotonic()
@@ -181,7 +181,7 @@ def test_kill(t, faults):
 def test_second_writer(t):
     """Other programs can read the file, but not paint in it; the first one continues. SIGINT ends with all saved."""
     paint = t.at("one.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "5")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "40")
     device, second = Device(p), []
 
     def begin_second(now):
@@ -215,7 +215,7 @@ def replay(t, paint, path, *more):
 def test_lifted_pen(t):
     """A device whose pen is lifted touches, and does not paint."""
     paint = t.at("lifted.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "3", "--record", t.at("lifted.path"))
+    p = t.start(paint, "--device", "udp:0", "--seconds", "40", "--record", t.at("lifted.path"))
     device = Device(p)
     device.draw(p, 0.5, kind=4)
     device.send((0, 0, 0), kind=3)
@@ -228,7 +228,7 @@ def test_stylus(t):
     """The pressure of a stylus sets the size and the opacity of points. Without pressure, nothing is painted."""
     paint = t.at("stylus.paint.h5")
     more = ("--colour", "0000ffff", "--fade", "0.5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "3", "--record", t.at("stylus.path"), *more)
+    p = t.start(paint, "--device", "udp:0", "--seconds", "40", "--record", t.at("stylus.path"), *more)
     device = Device(p)
     device.begin((0.1, 0.5, 1.2))
     for i in range(60):
@@ -248,7 +248,7 @@ def test_unplugged(t, stopped):
     """A device whose positions are missing for a time does not paint along the way to its next position.
     stopped: neither if the loop is stopped meanwhile."""
     paint = t.at(f"unplugged-{stopped}.paint.h5")
-    p = t.start(paint, "--device", "udp:0", "--seconds", "3")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "40")
     device = Device(p)
     device.draw(p, 0.4)
     time.sleep(0.1)
@@ -363,7 +363,7 @@ def test_probe(t):
 def test_full_disk(t, recovers):
     """The loop continues when the paint cannot be saved. It is saved when there is space again."""
     paint, limit = t.at(f"full-{recovers}.paint.h5"), (20000, resource.RLIM_INFINITY)
-    p = t.start(paint, "--device", "udp:0", "--seconds", "5", "--pen-radius", "0.0005", "--full-force", "1")
+    p = t.start(paint, "--device", "udp:0", "--seconds", "40", "--pen-radius", "0.0005", "--full-force", "1")
     device = Device(p)
     resource.prlimit(p.pid, resource.RLIMIT_FSIZE, limit)
     device.draw(p, 2.2)
@@ -393,7 +393,7 @@ def test_saved_elsewhere(t):
         os.mkdir(name)
     for moved in (False, True):
         paint = os.path.join(folder, f"{moved}.paint.h5")
-        p = t.start(paint, "--device", "udp:0", "--seconds", "3", env={**os.environ, "TMPDIR": other})
+        p = t.start(paint, "--device", "udp:0", "--seconds", "40", env={**os.environ, "TMPDIR": other})
         Device(p).draw(p, 0.4)
         if moved:
             os.rename(folder, t.at("moved"))
@@ -457,7 +457,7 @@ def test_view(t):
     os.mkdir(viewer)
     with open(os.path.join(viewer, "index.html"), "w", encoding="ascii") as out:
         out.write("<p>the page</p>")
-    p = t.start(paint, "--view", "--viewer", viewer, "--port", "0", "--device", "viewer", "--seconds", "5")
+    p = t.start(paint, "--view", "--viewer", viewer, "--port", "0", "--device", "viewer", "--seconds", "40")
     port = int(re.search(r"127\.0\.0\.1:(\d+)/", p.stderr.readline())[1])
     for site, status in (("cross-site", b" 403 "), ("same-site", b" 403 "), ("same-origin", b" 200 ")):
         head, page = request(port, "GET /live", "Sec-Fetch-Site: " + site)

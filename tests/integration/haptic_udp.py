@@ -86,7 +86,7 @@ def press(device, to, sequence):
             break
     assert got[7] > 10, got
     felt, begin = [], time.monotonic()
-    device.settimeout(1)
+    device.settimeout(10)
     while time.monotonic() < begin + 1:
         felt.append(FEEL.unpack(device.recv(4096))[7])
     assert felt == sorted(felt, reverse=True) and felt[0] > 10 and felt[-1] == 0, felt
@@ -97,7 +97,7 @@ def bridge(ebpo, model, program):
     """A sample that connects a device of another library presses on the top of the cube, with a force of the device.
 
     The hand gets at most the energy that it gives, with the tolerance of a motion of 0.6 mm in one step."""
-    p, to = begin(ebpo, model, "--seconds", "8", "--stiffness", "1000")
+    p, to = begin(ebpo, model, "--seconds", "40", "--stiffness", "1000")
     printed = subprocess.run([program, str(to[1]), "0.4", "1.2", "0.5", "1", "1000"], check=True, stdout=subprocess.PIPE,
                              text=True, timeout=60).stdout
     out, err = p.communicate(timeout=60)
@@ -109,7 +109,7 @@ def bridge(ebpo, model, program):
 
 def interrupt(ebpo, model, program):
     """SIGINT ends a sample with force 0, and ebpo haptic."""
-    p, to = begin(ebpo, model, "--seconds", "8")
+    p, to = begin(ebpo, model, "--seconds", "40")
     sample = subprocess.Popen([program, str(to[1]), "0.4", "1.2", "0.5", "1", "400"], stdout=subprocess.PIPE, text=True)
     time.sleep(0.6)
     sample.send_signal(signal.SIGINT)
@@ -126,7 +126,7 @@ def main(ebpo, *bridges):
         with open(ply, "w", encoding="ascii") as out:
             out.write(CUBE)
         subprocess.run([ebpo, "convert", "-q", ply, model], check=True)
-        p, to = begin(ebpo, model, "--seconds", "8", "--rate", "500")
+        p, to = begin(ebpo, model, "--seconds", "40", "--rate", "500")
         device, other = sender(), sender()
         for packet in NONE:  # before a device is connected
             other.sendto(packet, to)
