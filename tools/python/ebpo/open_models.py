@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import itertools
 import os
 from typing import Any
 
@@ -19,17 +20,19 @@ IO, CANCELLED = -3, -9
 ENTRY: dict = dict(members_of(c.ebpo_catalogue_options))
 
 _files: dict[int, Handle] = {}  # files that the library has open, by their addresses
-_options: list[dict] = []  # options of catalogues; the number of an opener is its index here plus 1
+_options: dict[int, dict] = {}  # options of catalogues by the number of their opener
 _numbers: dict[str, int] = {}
+_new_numbers = itertools.count(1)
 _raised: dict[str, BaseException] = {}  # exceptions that are not library errors, by their messages
 
 
 def opener(options: dict) -> int:
-    """Return the number by which `_open_file` finds these options for URLs."""
+    """Return the number by which `_open_file` finds these options for URLs. Any thread may call this."""
     key = repr(sorted(options.items()))
     if key not in _numbers:
-        _options.append(options)
-        _numbers[key] = len(_options)
+        number = next(_new_numbers)
+        _options[number] = options
+        _numbers.setdefault(key, number)  # another thread may have set it
     return _numbers[key]
 
 
@@ -47,7 +50,7 @@ def opened_by(name: str, options: dict) -> Handle:
 def _open_file(number: int, path: bytes, out: int, error: int) -> int:
     """Open a file for the library. The library calls it in any thread."""
     try:
-        file = opened_by(os.fsdecode(path), _options[number - 1])
+        file = opened_by(os.fsdecode(path), _options[number])
         _files[file.pointer.value] = file
         ctypes.c_void_p.from_address(out).value = file.pointer.value
         return 0
