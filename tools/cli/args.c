@@ -9,6 +9,7 @@
 
 #include "cli/command.h"
 #include "cli/renamed.h"
+#include "cli/words.h"
 
 static const arg_option help_option = {
     "help", 'h', ARG_FLAG, 0, NULL, "print this help and exit", 0, 0, NULL, NULL, NULL
@@ -251,7 +252,7 @@ static arg_result check_ending(const arg_spec *spec, const char *path)
 {
     static const char known[] = "ply obj stl off glb gltf vtk vtkhdf xdmf png jpg jpeg gif svg pdf "
                                 "html json csv npy h5 hdf5 zip";
-    const char *name = strrchr(path, '/'), *dot = strrchr(name ? name : path, '.');
+    const char *dot = strrchr(words_file_name(path), '.');
     if (!spec->writes || !dot || !is_among(known, dot + 1) || is_among(spec->writes, dot + 1))
         return ARGS_RUN;
     return refuse_args(spec, "'%s': the ending belongs to another format; the output is %s", path,

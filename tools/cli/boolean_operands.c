@@ -1,7 +1,7 @@
 #include "cli/boolean_operands.h"
 
-#include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "cli/command.h"
@@ -149,20 +149,20 @@ const char *boolean_operands_unit(const boolean_operands *o, const boolean_nodes
     return unit[0] ? unit : NULL;
 }
 
-/* Returns true, after an error message, if a model of the scene is the output file. */
+/* Returns true, after an error message, if a model of the scene is the output file, or without
+ * memory. */
 static bool overwrites_model(const boolean_input *in, const char *name, const char *out)
 {
     ebpo_scene_counts counts = EBPO_SCENE_COUNTS_INIT;
-    const char *slash = strrchr(in->path, '/');
-    int folder = slash ? (int)(slash + 1 - in->path) : 0; /* length of the scene's folder */
-    char path[PATH_MAX];
     (void)ebpo_scene_get_counts(in->scene, &counts);
     for (uint64_t i = 0; i < counts.models; i++) {
         ebpo_scene_model_facts facts = EBPO_SCENE_MODEL_FACTS_INIT;
         (void)ebpo_scene_get_model_facts(in->scene, i, &facts);
-        snprintf(path, sizeof path, "%.*s%s", facts.path[0] == '/' ? 0 : folder, in->path,
-                 facts.path);
-        if (command_overwrites(name, path, out))
+        char *path = command_path_in_scene(in->path, facts.path);
+        bool overwrites =
+            path ? command_overwrites(name, path, out) : command_no_memory(name) != EXIT_OK;
+        free(path);
+        if (overwrites)
             return true;
     }
     return false;

@@ -1,5 +1,6 @@
 #include "cli/command.h"
 #include "cli/process_memory.h"
+#include "cli/words.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -83,14 +84,11 @@ bool command_overwrites(const char *name, const char *in, const char *out)
 
 char *command_path_in_scene(const char *scene, const char *path)
 {
-    const char *last = strrchr(scene, '/');
     bool is_absolute = *path == '/' || strstr(path, "://");
 #ifdef _WIN32
-    const char *other = strrchr(last ? last : scene, '\\');
-    last = other ? other : last;
     is_absolute = is_absolute || *path == '\\' || (*path && path[1] == ':');
 #endif
-    size_t folder = last && !is_absolute ? (size_t)(last - scene) + 1 : 0, size = strlen(path);
+    size_t folder = is_absolute ? 0 : (size_t)(words_file_name(scene) - scene), size = strlen(path);
     char *joined = malloc(folder + size + 1);
     if (joined) {
         memcpy(joined, scene, folder);

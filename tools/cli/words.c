@@ -238,3 +238,13 @@ bool words_read_levels(const char *text, word_levels *out)
     out->is_contiguous = (run & (run + 1)) == 0;
     return true;
 }
+
+const char *words_file_name(const char *path)
+{
+    const char *last = strrchr(path, '/');
+#ifdef _WIN32
+    const char *other = strrchr(last ? last : path, '\\');
+    last = other ? other : last;
+#endif
+    return last ? last + 1 : path;
+}

@@ -70,4 +70,7 @@ extern const char *const normals_words[]; /* by ebpo_normal_distance */
 extern const char *const codec_words[];
 extern const char *const part_words[]; /* word i is bit i */
 
+/* Returns the part of a path after the last separator ('/', on Windows also '\\'). */
+const char *words_file_name(const char *path);
+
 #endif

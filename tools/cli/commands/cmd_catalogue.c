@@ -179,8 +179,8 @@ static void sum_models(catalogue *c)
 /* Returns the folder of a file that may not exist, with links resolved; or NULL. */
 static char *real_folder(const char *path)
 {
-    const char *slash = strrchr(path, '/');
-    char *folder = slash ? strndup(path, (size_t)(slash - path) + 1) : strdup(".");
+    const char *name = words_file_name(path);
+    char *folder = name > path ? strndup(path, (size_t)(name - path)) : strdup(".");
     char *real = folder ? realpath(folder, NULL) : NULL;
     free(folder);
     return real;
@@ -235,8 +235,7 @@ static int write_all(const catalogue *c)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_catalogue_options catalogue_options = EBPO_CATALOGUE_OPTIONS_INIT;
     ebpo_catalogue *made = NULL;
-    const char *slash = strrchr(c->out, '/');
-    char *folder = slash ? strndup(c->out, (size_t)(slash - c->out) + 1) : strdup("");
+    char *folder = strndup(c->out, (size_t)(words_file_name(c->out) - c->out));
     ebpo_catalogue_entry *entries = calloc(c->models, sizeof *entries);
     uint64_t count = 0;
     if (!folder || !entries) {

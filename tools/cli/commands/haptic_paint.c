@@ -968,14 +968,14 @@ ebpo_status haptic_paint_open(haptic_paint **out, const haptic_pen *pen, const e
 static void save_elsewhere(const haptic_paint *p, ebpo_error *error)
 {
     enum { MESSAGE = sizeof error->message };
-    const char *name = strrchr(p->pen.path, '/'), *folder = getenv("TMPDIR");
+    const char *folder = getenv("TMPDIR");
     char path[2][PATH_MAX], where[2 * PATH_MAX + 64] = "; the paint since the last save is lost";
     ebpo_error ignored = EBPO_ERROR_INIT;
     int saved = 0;
-    name = name ? name + 1 : p->pen.path;
     folder = folder && *folder ? folder : "/tmp";
     snprintf(path[0], PATH_MAX, "%s.unsaved-%ld", p->pen.path, (long)getpid());
-    snprintf(path[1], PATH_MAX, "%s/%s.unsaved-%ld", folder, name, (long)getpid());
+    snprintf(path[1], PATH_MAX, "%s/%s.unsaved-%ld", folder, words_file_name(p->pen.path),
+             (long)getpid());
     while (saved < 2 && ebpo_paint_save(p->saved, path[saved], &ignored) != EBPO_OK)
         saved++;
     if (saved < 2)

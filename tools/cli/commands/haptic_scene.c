@@ -9,6 +9,7 @@
 #include "cli/command.h"
 #include "cli/commands/haptic_device.h"
 #include "cli/json.h"
+#include "cli/words.h"
 
 static ebpo_status fail_scene(ebpo_error *error, ebpo_status status, const char *name,
                               const char *what)
@@ -186,10 +187,9 @@ static bool write_models(const haptic_scene *s, json *j)
     bool done = true;
     json_object(j, "models");
     for (uint64_t i = 0; i < s->surface_count; i++) {
-        const char *slash = strrchr(s->paths[i], '/');
         char *file = NULL;
-        if (asprintf(&file, "models/%llu/%s", (unsigned long long)i,
-                     slash ? slash + 1 : s->paths[i]) < 0)
+        if (asprintf(&file, "models/%llu/%s", (unsigned long long)i, words_file_name(s->paths[i])) <
+            0)
             file = NULL;
         done &= file != NULL;
         json_object(j, s->surfaces[i].name);
@@ -244,7 +244,6 @@ static void write_cameras(const haptic_scene *s, json *j)
 
 char *haptic_scene_text(const haptic_scene *s)
 {
-    const char *slash = strrchr(s->name, '/');
     char *text = NULL;
     size_t size;
     json j;
@@ -254,7 +253,7 @@ char *haptic_scene_text(const haptic_scene *s)
     json_begin(&j, out);
     json_object(&j, NULL);
     json_text(&j, "ebpo_scene", "1.0");
-    json_text(&j, "title", slash ? slash + 1 : s->name);
+    json_text(&j, "title", words_file_name(s->name));
     bool done = write_models(s, &j);
     write_instances(s, &j);
     write_cameras(s, &j);

@@ -241,9 +241,8 @@ static model *new_model(site *s, const char *path)
     if (!m)
         return NULL;
     pthread_mutex_init(&m->lock, NULL);
-    const char *slash = strrchr(path, '/');
     m->path = strdup(path);
-    m->name = strdup(slash ? slash + 1 : path);
+    m->name = strdup(words_file_name(path));
     char *encoded = m->name ? encode_name(m->name) : NULL;
     if (!encoded || asprintf(&m->address, "%zu/%s", s->models, encoded) < 0)
         m->address = NULL;

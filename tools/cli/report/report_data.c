@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "cli/command.h"
+#include "cli/words.h"
 
 const unsigned deadlines_us[DEADLINES] = { 1, 2, 5, 10, 20, 50, 100, 1000 };
 const unsigned budget_parts[BUDGETS] = { 1, 2, 4, 8, 16 };
@@ -275,8 +276,7 @@ void comparison_free(comparison *c)
 
 void report_stem(const char *path, char *out, size_t capacity)
 {
-    const char *shown = remote_shown(path), *slash = strrchr(shown, '/');
-    snprintf(out, capacity, "%s", slash ? slash + 1 : shown);
+    snprintf(out, capacity, "%s", words_file_name(remote_shown(path)));
     char *ending = strstr(out, ".ebpo.h5");
     char *dot = ending ? ending : strrchr(out, '.');
     if (dot && dot != out)
