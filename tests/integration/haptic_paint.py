@@ -394,11 +394,13 @@ def test_saved_elsewhere(t):
     for moved in (False, True):
         paint = os.path.join(folder, f"{moved}.paint.h5")
         p = t.start(paint, "--device", "udp:0", "--seconds", "40", env={**os.environ, "TMPDIR": other})
-        Device(p).draw(p, 0.4)
+        device = Device(p)
+        device.draw(p, 0.4)
         if moved:
             os.rename(folder, t.at("moved"))
         else:
             os.utime(paint)  # as if another program had changed it
+        device.draw(p, 0.4)  # the paint may have been saved just before the change
         p.send_signal(signal.SIGTERM)
         out, err = p.communicate(timeout=60)
         made = f"{other if moved else folder}/{moved}.paint.h5.unsaved-{p.pid}"
