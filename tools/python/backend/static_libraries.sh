@@ -18,8 +18,18 @@ prefix=$(cd "$prefix" && pwd)
 work=$(mktemp -d "${TMPDIR:-/tmp}/ebpo-libraries-XXXXXX")
 trap 'rm -rf "$work"' EXIT
 trap 'exit 1' HUP INT TERM
+for program in make m4 dpkg-source; do
+    command -v $program >/dev/null || {
+        echo "static_libraries.sh: the program $program is missing; on Debian: apt install build-essential m4" >&2
+        exit 1
+    }
+done
 exec 3>&1 >"$prefix/log.txt" 2>&1
-failed() { echo "static_libraries.sh: $1 failed; the messages are in $prefix/log.txt" >&3 && exit 1; }
+failed() { # what
+    tail -n 20 "$prefix/log.txt" >&3
+    echo "static_libraries.sh: $1 failed; its last messages are above (with EBPO_LIBRARIES, all are in log.txt there)" >&3
+    exit 1
+}
 
 names="zlib libzstd gmp nettle jansson hdf5 $*"
 sources=${EBPO_SOURCES:-$work}
