@@ -63,7 +63,7 @@ fi
     tail /build.log
     exit 1
 }
-units="dialects ply head container predicates face_gates chunk_sums source import number slice wide
+units="dialects ply head container predicates face_gates chunk_checksums source import number slice wide
     large_offsets"
 programs="tools/ebpo samples/ebpo-generate tests/vectors/make_vectors tests/vectors/test_vectors \
     tests/lint/flags/fp_hash_default tests/lint/flags/predicates_hash_small tests/unit/test_unit \
