@@ -466,7 +466,8 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
 static const uint64_t least_memory = UINT64_C(4) << 20;
 
 /* If the exact result is written with --memory or --temp-dir, makes the workspace. With --memory,
- * sets the limit of each model; all models together may use a quarter of the memory. */
+ * sets the limit of each model. All models together may use an eighth of the memory: with more, the
+ * search for intersecting faces is hardly faster, and the arrays of the meshes have less. */
 static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
                         ebpo_workspace **out)
 {
@@ -477,7 +478,7 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;
     if (model_options->memory) {
-        model_options->memory /= 4 * count;
+        model_options->memory /= 8 * count;
         if (model_options->memory < least_memory)
             model_options->memory = least_memory;
     }
