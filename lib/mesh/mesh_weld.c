@@ -161,7 +161,7 @@ static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, un
 
 /* --- groups in a mesh of any order --- */
 
-static ebpo_status group_by_table(welding *w, ebpo_error *error)
+static ebpo_status group_by_positions(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     ebpo_positions positions = { .mesh = NULL };
@@ -414,7 +414,7 @@ static ebpo_status run_welding(welding *w, ebpo_error *error)
         status = group_within(w, error);
     else
         status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error)
-                                                                 : group_by_table(w, error);
+                                                                 : group_by_positions(w, error);
     if (status != EBPO_OK || w->kept == mesh->vertex_count)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);

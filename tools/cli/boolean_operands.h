@@ -26,6 +26,9 @@ typedef struct boolean_operands {
     const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
     uint32_t count;                      /* number of operands */
     bool raises_memory; /* large models may use more memory than model_options.memory */
+    /* a model that needs more memory than model_options.memory gets it, up to this; 0: it does not
+     */
+    uint64_t memory_max;
 } boolean_operands;
 
 /* Lists the operands in the order of the paths, which end with NULL. A path is a model, or a scene
