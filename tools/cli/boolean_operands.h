@@ -26,8 +26,7 @@ typedef struct boolean_operands {
     const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
     uint32_t count;                      /* number of operands */
     bool raises_memory; /* large models may use more memory than model_options.memory */
-    /* a model that needs more memory than model_options.memory gets it, up to this; 0: it does not
-     */
+    /* maximum memory of a model that needs more than model_options.memory; 0: no model gets more */
     uint64_t memory_max;
 } boolean_operands;
 
