@@ -34,7 +34,7 @@ typedef struct ebpo_sort {
     ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
                         ebpo_error *error);
     /* Compares two different records with equal keys. Returns a number below 0 if `a` comes first,
-     * above 0 if `b` comes first. */
+     * above 0 if `b` comes first. NULL if all keys are different. */
     int (*compare)(const void *a, const void *b);
     /* Receives the sorted records of a group. Called from any thread. `place`: index of the first
      * of these records among all sorted records. */

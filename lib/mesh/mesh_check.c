@@ -587,7 +587,7 @@ static void compare_along_curve(const ebpo_check *check)
     }
 }
 
-/* Finds repeated positions in any mesh, with a hash table. */
+/* Finds repeated positions in any mesh. */
 static ebpo_status compare_all(const ebpo_check *check, ebpo_error *error)
 {
     const ebpo_mesh *mesh = check->mesh;

@@ -186,24 +186,26 @@ static inline void ebpo_frame_position(const ebpo_mesh_frame *frame, const ebpo_
             out[k] = ldexp(out[k], -frame->exponent[k]);
 }
 
-/* A hash table of all positions; each entry is the lowest vertex index at its position. The table
- * takes 5.3 to 10.7 bytes for each vertex. */
+/* The first vertex at the position of each vertex. */
 typedef struct ebpo_positions {
     const ebpo_mesh *mesh; /* borrowed */
-    uint32_t *slots;       /* [mask + 1] vertex indices; EBPO_NO_INDEX: a free slot */
-    uint64_t mask;
+    uint32_t *first;       /* [vertex_count] lowest vertex index at the position of each vertex */
     ebpo_workspace *workspace; /* workspace of the mesh */
     uint64_t repeated; /* number of vertices that repeat the position of an earlier vertex */
 } ebpo_positions;
 
-/* Builds the table. -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The
- * result does not depend on the number of threads. */
+/* Compares all positions by sorting their hashes, which takes another 16 bytes for each vertex
+ * meanwhile. -0 equals 0; NaNs are compared by their bits. `out` is cleared on failure. The result
+ * does not depend on the number of threads. */
 EBPO_MUST_USE ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh,
                                                unsigned threads, const ebpo_progress *progress,
                                                ebpo_error *error);
 void ebpo_positions_free(ebpo_positions *positions);
 
 /* Returns the lowest vertex index at the position of v. */
-uint32_t ebpo_positions_first(const ebpo_positions *positions, uint32_t v);
+static inline uint32_t ebpo_positions_first(const ebpo_positions *positions, uint32_t v)
+{
+    return positions->first[v];
+}
 
 #endif

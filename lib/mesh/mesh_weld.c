@@ -12,10 +12,12 @@
 #include "core/fp_env.h"
 #include "core/hash.h"
 #include "core/parallel.h"
+#include "core/sort.h"
 #include "mesh/attributes.h"
 #include "mesh/mesh_parts.h"
 
-enum { VERTEX_GRAIN = 1 << 14 };
+/* A record of a position, without its lower HASH_SHIFT bits, is below EBPO_SORT_BINS. */
+enum { HASH_SHIFT = 46 };
 
 /* The bits of a position as doubles, in which -0 is replaced by 0. */
 typedef struct key {
@@ -38,51 +40,77 @@ static inline bool same_key(const key *a, const key *b)
     return a->bits[0] == b->bits[0] && a->bits[1] == b->bits[1] && a->bits[2] == b->bits[2];
 }
 
-/* Inserts vertex v. Returns true if the position was already present. After all insertions, in any
- * order, the slot of a position holds the lowest vertex at this position. */
-static bool insert_position(ebpo_positions *t, uint32_t v)
+/* Makes the records of vertices: the upper half of the hash of the position, then the vertex. */
+static ebpo_status make_hashes(void *context, uint64_t begin, uint64_t end, void *records,
+                               ebpo_error *error)
 {
-    key k = key_of(t->mesh, v);
-    for (uint64_t h = ebpo_hash_three(k.bits) & t->mask;; h = (h + 1) & t->mask) {
-        uint32_t stored = __atomic_load_n(&t->slots[h], __ATOMIC_RELAXED);
-        if (stored == EBPO_NO_INDEX &&
-            __atomic_compare_exchange_n(&t->slots[h], &stored, v, false, __ATOMIC_RELAXED,
-                                        __ATOMIC_RELAXED))
-            return false;
-        key stored_key = key_of(t->mesh, stored);
-        if (!same_key(&k, &stored_key))
-            continue;
-        while (v < stored && !__atomic_compare_exchange_n(&t->slots[h], &stored, v, false,
-                                                          __ATOMIC_RELAXED, __ATOMIC_RELAXED))
-            ;
-        return true;
+    const ebpo_positions *t = context;
+    uint64_t *out = records;
+    (void)error;
+    for (uint64_t v = begin; v < end; v++) {
+        key k = key_of(t->mesh, (uint32_t)v);
+        *out++ = ebpo_hash_three(k.bits) >> 32 << 32 | v;
+        t->first[v] = (uint32_t)v;
     }
+    return EBPO_OK;
 }
 
-static ebpo_status insert_range(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+/* Sets t->first of vertices with equal hashes. record: their records, in ascending order. Returns
+ * the number of vertices that repeat the position of an earlier vertex. Positions with equal hashes
+ * are nearly always equal, so nearly all vertices but the first are skipped. */
+static uint64_t compare_positions(const ebpo_positions *t, const uint64_t *record, uint64_t count)
 {
-    (void)worker, (void)error;
-    ebpo_positions *t = context;
     uint64_t repeated = 0;
-    EBPO_FOR_ITEMS_SCATTERED(t->mesh->workspace, v, begin, end)
-        repeated += insert_position(t, (uint32_t)v);
+    for (uint64_t i = 0; i + 1 < count; i++) {
+        uint32_t v = (uint32_t)record[i];
+        if (t->first[v] != v)
+            continue;
+        key k = key_of(t->mesh, v);
+        for (uint64_t n = i + 1; n < count; n++) {
+            uint32_t later = (uint32_t)record[n];
+            key other = key_of(t->mesh, later);
+            if (!same_key(&k, &other))
+                continue;
+            t->first[later] = v;
+            repeated++;
+        }
+    }
+    return repeated;
+}
+
+/* Receives sorted records; all records with one hash are in the same call. */
+static void take_hashes(void *context, uint64_t place, const void *records, uint64_t count)
+{
+    ebpo_positions *t = context;
+    const uint64_t *record = records;
+    uint64_t repeated = 0;
+    (void)place;
+    for (uint64_t i = 0, end; i < count; i = end) {
+        for (end = i + 1; end < count && record[end] >> 32 == record[i] >> 32;)
+            end++;
+        repeated += compare_positions(t, record + i, end - i);
+    }
     __atomic_fetch_add(&t->repeated, repeated, __ATOMIC_RELAXED);
-    return EBPO_OK;
 }
 
 ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, unsigned threads,
                                  const ebpo_progress *progress, ebpo_error *error)
 {
-    uint64_t size = ebpo_hash_slots(mesh->vertex_count + mesh->vertex_count / 3);
-    *out = (ebpo_positions){ .mesh = mesh, .workspace = mesh->workspace, .mask = size - 1 };
-    out->slots = ebpo_array_alloc(mesh->workspace, size, sizeof *out->slots);
-    if (!out->slots)
-        return ebpo_workspace_fail(mesh->workspace, size * sizeof *out->slots, error);
-    ebpo_array_fill(mesh->workspace, out->slots, 0xff, size * sizeof *out->slots);
-    ebpo_status status =
-        ebpo_parallel_for(threads, NULL, mesh->vertex_count, VERTEX_GRAIN, insert_range, out,
-                          progress, "comparing positions", error);
+    const ebpo_sort sort = { .workspace = mesh->workspace,
+                             .threads = ebpo_thread_count(threads),
+                             .progress = progress,
+                             .stage = "comparing positions",
+                             .count = mesh->vertex_count,
+                             .record = sizeof(uint64_t),
+                             .shift = HASH_SHIFT,
+                             .context = out,
+                             .make = make_hashes,
+                             .take = take_hashes }; /* no `compare`: all records are different */
+    *out = (ebpo_positions){ .mesh = mesh, .workspace = mesh->workspace };
+    out->first = ebpo_array_alloc(mesh->workspace, mesh->vertex_count, sizeof *out->first);
+    if (!out->first)
+        return ebpo_workspace_fail(mesh->workspace, mesh->vertex_count * sizeof *out->first, error);
+    ebpo_status status = ebpo_sort_run(&sort, error);
     if (status != EBPO_OK)
         ebpo_positions_free(out);
     return status;
@@ -90,24 +118,8 @@ ebpo_status ebpo_positions_build(ebpo_positions *out, const ebpo_mesh *mesh, uns
 
 void ebpo_positions_free(ebpo_positions *positions)
 {
-    ebpo_array_free(positions->workspace, positions->slots);
+    ebpo_array_free(positions->workspace, positions->first);
     *positions = (ebpo_positions){ .mesh = NULL };
-}
-
-static inline bool has_key(const ebpo_positions *t, uint32_t stored, uint32_t v, const key *k)
-{
-    if (stored == v)
-        return true;
-    key stored_key = key_of(t->mesh, stored);
-    return same_key(k, &stored_key);
-}
-
-uint32_t ebpo_positions_first(const ebpo_positions *t, uint32_t v)
-{
-    key k = key_of(t->mesh, v);
-    uint64_t at;
-    EBPO_HASH_FIND(at, ebpo_hash_three(k.bits), t->mask, has_key(t, t->slots[at], v, &k));
-    return t->slots[at];
 }
 
 enum {
@@ -147,9 +159,9 @@ static ebpo_status check_indices(void *context, uint64_t begin, uint64_t end, un
     return EBPO_OK;
 }
 
-/* --- groups in a mesh of any order: hash table of positions --- */
+/* --- groups in a mesh of any order --- */
 
-static ebpo_status group_by_table(welding *w, ebpo_error *error)
+static ebpo_status group_by_positions(welding *w, ebpo_error *error)
 {
     const ebpo_mesh *mesh = w->mesh;
     ebpo_positions positions = { .mesh = NULL };
@@ -402,7 +414,7 @@ static ebpo_status run_welding(welding *w, ebpo_error *error)
         status = group_within(w, error);
     else
         status = mesh->arrangement && mesh->arrangement->grouped ? group_neighbours(w, error)
-                                                                 : group_by_table(w, error);
+                                                                 : group_by_positions(w, error);
     if (status != EBPO_OK || w->kept == mesh->vertex_count)
         return status;
     status = ebpo_mesh_check_whole(mesh, error);

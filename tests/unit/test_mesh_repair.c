@@ -384,6 +384,36 @@ START_TEST(test_build_rearranges_repaired_mesh)
 }
 END_TEST
 
+/* Finds the first vertex at each position of a grid in which later vertices repeat some positions,
+ * with memory for everything (_i = 0) and with little memory. There are so many positions that
+ * several different ones have equal hashes. */
+START_TEST(test_positions_find_first_vertices)
+{
+    enum { GRID = 1 << 18, REPEATED = 4000, ALL_VERTICES = GRID + REPEATED };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = { .vertex_count = ALL_VERTICES };
+    ebpo_positions found;
+    if (_i)
+        ck_assert(ebpo_workspace_make_any(&mesh.workspace, 1 << 20, NULL, &error) == EBPO_OK);
+    mesh.xyz64 = ebpo_array_alloc(mesh.workspace, ALL_VERTICES, 3 * sizeof *mesh.xyz64);
+    for (uint64_t v = 0; v < ALL_VERTICES; v++) {
+        uint64_t at =
+            v < GRID ? v : v % 1000 * 97; /* each of these positions is repeated 4 times */
+        for (unsigned k = 0; k < 3; k++)
+            mesh.xyz64[3 * v + k] = 0.1 * (double)(at >> 6 * k & 63);
+        if (v >= GRID && at % 64 == 0)
+            mesh.xyz64[3 * v] = -0.0;
+    }
+    ck_assert(ebpo_positions_build(&found, &mesh, 2, &silent, &error) == EBPO_OK);
+    ck_assert_uint_eq(found.repeated, REPEATED);
+    for (uint64_t v = 0; v < ALL_VERTICES; v++)
+        ck_assert_uint_eq(ebpo_positions_first(&found, (uint32_t)v), v < GRID ? v : v % 1000 * 97);
+    ebpo_positions_free(&found);
+    ebpo_array_free(mesh.workspace, mesh.xyz64);
+    ebpo_workspace_free(mesh.workspace);
+}
+END_TEST
+
 TEST_SUITE(mesh_repair)
 {
     Suite *suite = suite_create("mesh_repair");
@@ -395,6 +425,7 @@ TEST_SUITE(mesh_repair)
                         ebpo_test_solid_count + 2);
     tcase_add_loop_test(tests, test_repair_result_ignores_memory_budget, 0, 2);
     tcase_add_test(tests, test_weld_of_arranged_mesh_matches);
+    tcase_add_loop_test(tests, test_positions_find_first_vertices, 0, 2);
     tcase_add_loop_test(tests, test_prepare_repairs_in_order_and_reports, 0, ebpo_test_solid_count);
     tcase_add_test(tests, test_prepare_cancel_and_size_limit);
     tcase_add_test(tests, test_build_rearranges_repaired_mesh);

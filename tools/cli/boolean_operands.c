@@ -71,8 +71,10 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
     ebpo_boolean_operand operand[BOOLEAN_OPERANDS];
     ebpo_error error = EBPO_ERROR_INIT;
     uint32_t count = 0;
-    /* raises_memory: the least memory of the models is not known before they are open */
+    /* the least memory of the models is not known before they are open */
     load.memory = model_options->memory * in->count * (o->raises_memory ? 16 : 1);
+    if (o->memory_max)
+        load.memory = o->memory_max * in->count;
     load.cut_level = model_options->cut_level;
     load.threads = model_options->threads;
     load.max_expansion = (uint64_t)remote->max_expansion;
@@ -84,6 +86,20 @@ static int open_scene(boolean_operands *o, const char *name, boolean_input *in,
     return status == EBPO_OK ? EXIT_OK : command_failed(name, &error);
 }
 
+/* Raises the memory for a model that needs more. */
+static void raise_memory(const boolean_operands *o, const ebpo_file *file, uint64_t *memory)
+{
+    const ebpo_model_options any_level = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
+    if (ebpo_model_memory(file, &any_level, &plan, NULL) != EBPO_OK)
+        return; /* the error is reported when the model is made */
+    uint64_t wanted = plan.least < o->memory_max ? plan.least : o->memory_max;
+    if (o->raises_memory)
+        wanted = 2 * plan.least;
+    if (*memory < wanted)
+        *memory = wanted;
+}
+
 /* Opens a model. A cut level below the model's last level is no error, because other models may
  * have more levels. Then the whole model stays in memory. */
 static int open_model(boolean_operands *o, const char *name, boolean_input *in,
@@ -91,13 +107,9 @@ static int open_model(boolean_operands *o, const char *name, boolean_input *in,
 {
     const ebpo_model_options any_level = EBPO_MODEL_OPTIONS_INIT;
     ebpo_model_options options = *model_options;
-    ebpo_model_plan plan = EBPO_MODEL_PLAN_INIT;
-    ebpo_error error = EBPO_ERROR_INIT;
     int code = query_open_file(&in->session, name, in->path, &any_level, -1, remote);
-    if (code == EXIT_OK && o->raises_memory &&
-        ebpo_model_memory(in->session.file, &any_level, &plan, &error) == EBPO_OK &&
-        options.memory < 2 * plan.least)
-        options.memory = 2 * plan.least;
+    if (code == EXIT_OK && (o->raises_memory || o->memory_max))
+        raise_memory(o, in->session.file, &options.memory);
     if (code == EXIT_OK)
         code = query_open_model(&in->session, name, &options);
     o->operand[in->first].model = in->session.model;

@@ -26,6 +26,8 @@ typedef struct boolean_operands {
     const char *shown[BOOLEAN_OPERANDS]; /* path of the model, or name of the instance */
     uint32_t count;                      /* number of operands */
     bool raises_memory; /* large models may use more memory than model_options.memory */
+    /* maximum memory of a model that needs more than model_options.memory; 0: no model gets more */
+    uint64_t memory_max;
 } boolean_operands;
 
 /* Lists the operands in the order of the paths, which end with NULL. A path is a model, or a scene

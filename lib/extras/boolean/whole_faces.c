@@ -21,9 +21,11 @@
 
 static const char stage[] = "join faces";
 
-/* FACE_GRAIN: number of faces in one task of a thread. Number of edges that are listed at once:
- * EDGES, or FEW_EDGES if arrays are in a workspace, which limits the memory. */
-enum { FACE_GRAIN = 1 << 16, EDGES = 1 << 23, FEW_EDGES = 1 << 20 };
+/* FACE_GRAIN: number of faces in one task of a thread. EDGES: greatest number of edges that are
+ * listed at once. EDGE_BYTES: if arrays are in a workspace, at most one edge for this many bytes of
+ * its budget is listed at once. So the lists, of 8 bytes for each edge and for each corner, use at
+ * most an eighth of the budget. */
+enum { FACE_GRAIN = 1 << 16, EDGES = 1 << 23, EDGE_BYTES = 128 };
 
 typedef struct joining {
     ebpo_whole_faces *out;
@@ -192,8 +194,10 @@ static ebpo_status join_run(joining *j, uint64_t first, uint64_t *end, uint64_t 
 
 static ebpo_status join_all(joining *j, const ebpo_progress *progress, ebpo_error *error)
 {
-    uint64_t capacity = j->mesh->workspace ? FEW_EDGES : EDGES, all = 3 * j->mesh->face_count;
+    uint64_t capacity = EDGES, all = 3 * j->mesh->face_count;
     ebpo_status status = EBPO_OK;
+    if (j->mesh->workspace && ebpo_workspace_memory(j->mesh->workspace) / EDGE_BYTES < capacity)
+        capacity = ebpo_workspace_memory(j->mesh->workspace) / EDGE_BYTES;
     EBPO_FOR_ITEMS(j->mesh->workspace, n, 0, j->mesh->vertex_count)
         capacity = j->degree[n] > capacity ? j->degree[n] : capacity;
     capacity = capacity < all ? capacity : all;

@@ -164,8 +164,10 @@ void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
         free(s->hull[i]);
     free(s->hull);
     free(s->rank);
+    free(s->chain);
     s->hull = NULL;
     s->rank = NULL;
+    s->chain = NULL;
 }
 
 /* --- tables of nodes --- */
@@ -284,44 +286,57 @@ static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
     ebpo_planes_cut(envelope, codes, count);
 }
 
-/* Computes the envelope in coordinates in which the cell is a unit cube. */
-static void cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_polytope *out)
+/* The envelopes of the last cell and of the cells that contain it, each in coordinates in which its
+ * cell is a unit cube. Most cells have the same parent as the last cell, and need only the planes
+ * of their own node. An envelope depends only on its index and on its cell. */
+typedef struct envelope_chain {
+    ebpo_octcode code[LEVELS_OF_PLANES]; /* octcode of each cell; 0: none */
+    ebpo_polytope at[LEVELS_OF_PLANES];
+} envelope_chain;
+
+/* Returns the envelope of a cell, in the chain. */
+static const ebpo_polytope *cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
+    envelope_chain *c = s->chain;
     ebpo_posed_node node = ebpo_posed_root(s);
-    ebpo_polytope parent;
-    ebpo_polytope_cube(out);
+    ebpo_octcode last = ebpo_octcode_of_cell(cell);
+    int first = cell.level < LEVELS_OF_PLANES ? 0 : cell.level - LEVELS_OF_PLANES + 1;
     for (int level = 0;; level++) {
-        bool cuts = level + LEVELS_OF_PLANES > cell.level; /* the planes of this level are used */
-        if (cuts)
-            cut_node(s, &node, out);
-        if (level == cell.level)
-            return;
-        unsigned octant = ebpo_cell_octant(cell, level);
-        node = ebpo_posed_child(s, &node, octant);
-        if (cuts) {
-            ebpo_polytope_copy(&parent, out);
-            (void)ebpo_polytope_child(&parent, octant, out); /* if this fails, `out` is a box around
-                                                              * the content */
+        int i = level - first; /* levels before `first` do not cut the envelope */
+        ebpo_octcode code = last >> 3 * (cell.level - level);
+        if (i >= 0 && c->code[i] != code) {
+            if (i == 0)
+                ebpo_polytope_cube(&c->at[0]);
+            else /* if this fails, the envelope is a box around the content */
+                (void)ebpo_polytope_child(&c->at[i - 1], (unsigned)(code & 7), &c->at[i]);
+            cut_node(s, &node, &c->at[i]);
+            c->code[i] = code;
         }
+        if (level == cell.level)
+            return &c->at[i];
+        node = ebpo_posed_child(s, &node, ebpo_cell_octant(cell, level));
     }
 }
 
 /* Returns the new posed envelope of a cell; NULL if memory is short. */
-static posed_hull *make_hull(const ebpo_posed_subtrees *s, ebpo_cell cell)
+static posed_hull *make_hull(ebpo_posed_subtrees *s, ebpo_cell cell)
 {
     ebpo_box box = ebpo_model_box(s->model);
-    ebpo_polytope p;
     double low[3], high[3], x[3];
-    cut_envelope(s, cell, &p);
-    posed_hull *out = malloc(sizeof *out + (size_t)p.vertex_count * sizeof *out->point);
+    if (!s->chain)
+        s->chain = ebpo_alloc_zero(1, sizeof *s->chain);
+    if (!s->chain)
+        return NULL;
+    const ebpo_polytope *p = cut_envelope(s, cell);
+    posed_hull *out = malloc(sizeof *out + (size_t)p->vertex_count * sizeof *out->point);
     ebpo_cell_bounds(&box, cell, low, high);
-    for (int i = 0; out && i < p.vertex_count; i++) {
+    for (int i = 0; out && i < p->vertex_count; i++) {
         for (int k = 0; k < 3; k++)
-            x[k] = low[k] + p.vertex[i][k] * (high[k] - low[k]);
+            x[k] = low[k] + p->vertex[i][k] * (high[k] - low[k]);
         ebpo_posing_apply(&s->posing, x, out->point[i]);
     }
     if (out) {
-        out->count = p.vertex_count;
+        out->count = p->vertex_count;
         out->code = ebpo_octcode_of_cell(cell);
     }
     return out;
@@ -364,7 +379,7 @@ ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_con
     if (!*hull) {
         *hull = make_hull(s, cell);
         if (!*hull)
-            return ebpo_fail_memory(error, sizeof(ebpo_polytope));
+            return ebpo_fail_memory(error, sizeof *s->chain);
         s->hulls++;
         s->bytes += sizeof **hull + (uint64_t)(*hull)->count * sizeof *(*hull)->point;
     }

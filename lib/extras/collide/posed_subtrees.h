@@ -32,6 +32,7 @@ typedef struct ebpo_posed_subtrees {
                                * requested; NULL: the entry is free */
     uint64_t hulls, slots;    /* number of envelopes; size of the table */
     uint64_t bytes;           /* memory of the envelopes and of the table */
+    struct envelope_chain *chain; /* for the next envelope; NULL: none was requested yet */
 } ebpo_posed_subtrees;
 
 /* A node in the part of the tree that is in memory. */

@@ -802,9 +802,9 @@ static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_er
 {
     const ebpo_collision *q = g->collision;
     ebpo_status status = begin_threads(g, threads, error);
-    if (status == EBPO_OK)
-        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[1], q->max_coordinate,
-                                    g->self, error);
+    if (status == EBPO_OK) /* if g->self, both models share the envelopes */
+        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[!g->self],
+                                    q->max_coordinate, g->self, error);
     if (status != EBPO_OK)
         return status;
     q->collider->subtree_pairs += g->pairs.count;

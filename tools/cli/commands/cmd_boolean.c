@@ -466,9 +466,11 @@ static int evaluate_expression(const values *v, const boolean_nodes *nodes,
 static const uint64_t least_memory = UINT64_C(4) << 20;
 
 /* If the exact result is written with --memory or --temp-dir, makes the workspace. With --memory,
- * sets the limit of each model; all models together may use a quarter of the memory. */
-static int limit_memory(const values *v, uint32_t count, ebpo_model_options *model_options,
-                        ebpo_workspace **out)
+ * sets the limit of each model. All models together use an eighth of the memory, or up to a quarter
+ * if they need more: with more than they need, the search for intersecting faces is hardly faster,
+ * and the arrays of the meshes have less. */
+static int limit_memory(const values *v, boolean_operands *operands,
+                        ebpo_model_options *model_options, ebpo_workspace **out)
 {
     const memory_values memory = { model_options->memory ? v->query.memory : NULL, v->temp_dir };
     ebpo_error error = EBPO_ERROR_INIT;
@@ -477,9 +479,10 @@ static int limit_memory(const values *v, uint32_t count, ebpo_model_options *mod
     if (!memory_check("boolean", &memory))
         return EXIT_USAGE;
     if (model_options->memory) {
-        model_options->memory /= 4 * count;
+        model_options->memory /= 8 * operands->count;
         if (model_options->memory < least_memory)
             model_options->memory = least_memory;
+        operands->memory_max = 2 * model_options->memory;
     }
     return memory_new(out, &memory, &error) == EBPO_OK ? EXIT_OK
                                                        : command_failed("boolean", &error);
@@ -511,7 +514,7 @@ static int run_expression(const values *v, const char *expression, boolean_opera
         operands->operand[i].pose = pose[i];
     int code = check_values(v, operands);
     if (code == EXIT_OK)
-        code = limit_memory(v, operands->count, &model_options, &workspace);
+        code = limit_memory(v, operands, &model_options, &workspace);
     operands->raises_memory =
         v->changed_only && model_options.memory == 0 && model_options.cut_level < 0;
     if (operands->raises_memory)
