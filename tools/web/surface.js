@@ -14,7 +14,7 @@ const EVERYTHING = 2_000_000;      // most triangles at all
 const WHOLE_FACES = 1 << 18;       // small files with at most so many faces are drawn with all faces
 const KEPT = 0.6;                  // a replaced patch returns when its error is smaller than this share of the allowed error
 const FACE_PIXELS = 1.5;           // the model's faces are drawn where a face covers at least so many pixels at normal detail
-const STAGES = [32, 4];            // the first picture is drawn with errors that are so many times greater
+const STAGES = [32, 4];            // the first picture is drawn with errors that are so many times greater, the first of them if there are no envelopes to draw before
 const FEW = 24;                    // unless so few patches are missing
 const COVERS = 1024;               // at most so many patches, as fine as possible, are compared to find hidden ones
 const HIDDEN = 4;                  // factor of the allowed error of hidden patches
@@ -29,6 +29,7 @@ export class Surface {
     this.mesh = info.parts.has('mesh');
     this.whole = small && this.mesh && info.face_count <= WHOLE_FACES;
     this.low = info.box_size.map((s) => -s / 2 * scene.scale);
+    this.stages = info.parts.has('planes') ? STAGES.slice(1) : STAGES;
     this.known = new Set(); // patches that were read
     this.opened = new Set(); // patches that are replaced in the last choice
     let triangles = 0;
@@ -130,7 +131,7 @@ export class Surface {
   next(view, want) {
     const missing = ({ chosen }) => chosen.filter((c) => !this.known.has(nameOf(c))).length;
     let made = this.choose(view, want);
-    const staged = !this.complete && missing(made) > FEW && STAGES.map((coarser) => this.choose(view, want, coarser)).find((c) => missing(c) > 0);
+    const staged = !this.complete && missing(made) > FEW && this.stages.map((coarser) => this.choose(view, want, coarser)).find((c) => missing(c) > 0);
     made = staged || made;
     return { ...made, last: !staged, name: made.chosen.map(nameOf).join() };
   }
