@@ -89,17 +89,21 @@ export class Surface {
     const share = want.pixels / CELL_PIXELS, allowed = coarser * share * ERROR, most = Math.min(want.triangles, EVERYTHING, TRIANGLES / share);
     const heap = new Heap(), chosen = [], opened = new Set(), hidden = whole ? undefined : this.#hiddenIn(view);
     let triangles = 0;
-    const seen = patches.map((p) => {
-      const scale = this.#pixelsAt(p, view), error = p.error * this.scene.scale * scale;
-      return { scale, error, size: error / (hidden?.has(p) ? HIDDEN : 1) };
-    });
     // The limit of triangles may be reached before all errors are small enough. Errors are compared by powers of 4. Of similar errors, those of the block with the
     // greatest sum are first, because scattered patches would need most chunks of the file.
-    const sums = new Map();
-    seen.forEach(({ size }, i) => size > allowed && sums.set(this.block[i], (sums.get(this.block[i]) ?? 0) + size));
+    const seen = new Map(), sums = new Map(), see = (patch) => {
+      const p = patches[patch], scale = this.#pixelsAt(p, view), error = p.error * this.scene.scale * scale, size = error / (hidden?.has(p) ? HIDDEN : 1), block = this.block[patch];
+      seen.set(patch, { scale, error, size });
+      if (size > allowed)
+        sums.set(block, (sums.get(block) ?? 0) + size);
+      for (let child = p.child; child < p.end && (whole || size > KEPT * allowed); child++)
+        see(child);
+    };
+    see(0);
     const urgency = (size, block) => (size > allowed ? 1e9 * (100 + Math.floor(Math.log2(size / (allowed || 1)) / 2)) + (block === undefined ? size : sums.get(block)) : size);
     const offer = (patch, parent) => {
-      heap.push({ ...seen[patch], patch, parent, px: urgency(seen[patch].size, this.block[patch]) });
+      const found = seen.get(patch);
+      heap.push({ ...found, patch, parent, px: urgency(found.size, this.block[patch]) });
       triangles += patches[patch].triangles;
     };
     offer(0);
