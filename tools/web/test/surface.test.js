@@ -83,7 +83,8 @@ function fullTree(triangles, errorOf) {
 }
 
 test('below a limit of triangles, patches that are stored together are refined together', () => {
-  const surface = fullTree(500, (level, i) => 0.1 / 4 ** level * (1 + (i * 37 % 64) / 64)), { chosen, triangles } = surface.choose({ ...view, eye: [0, 0, 20], pixels: 30_000 }, { ...want, triangles: 135_000 });
+  const surface = fullTree(500, (level, i) => 0.1 / 4 ** level * (1 + (i * 37 % 64) / 64));
+  const { chosen, triangles } = surface.choose({ ...view, eye: [0, 0, 20], pixels: 30_000 }, { ...want, triangles: 135_000 });
   const fine = chosen.map(({ patch }) => patch).filter((patch) => patch >= 73), runs = fine.filter((patch) => !fine.includes(patch - 1)).length;
   assert.ok(triangles <= 135_000 && fine.length > 200, `${fine.length} of 512 patches`);
   assert.ok(runs <= 5, `${fine.length} patches are in ${runs} places`);
@@ -92,7 +93,8 @@ test('below a limit of triangles, patches that are stored together are refined t
 test('patches behind others stay coarser, in a known view', () => {
   const surface = fullTree(10, (level) => 0.06 / 4 ** level), { patches } = surface, s = Math.SQRT1_2;
   const far = { eye: [0, 0, 2.5], planes: [[s, 0, -s, 2.5 * s], [-s, 0, -s, 2.5 * s], [0, -s, -s, 2.5 * s], [0, s, -s, 2.5 * s]], pixels: 2000 };
-  const levelsAt = (v, z) => new Set(surface.choose(v, want).chosen.map(({ patch }) => patches[patch]).filter(({ level, at }) => Math.floor(at[2] * 4 / 2 ** level) === z).map(({ level }) => level));
+  const levelsAt = (v, z) => new Set(surface.choose(v, want).chosen.map(({ patch }) => patches[patch])
+    .filter(({ level, at }) => Math.floor(at[2] * 4 / 2 ** level) === z).map(({ level }) => level));
   assert.deepEqual(levelsAt(far, 3), new Set([3]));
   assert.deepEqual(levelsAt(far, 0), new Set([2]));
   assert.deepEqual(levelsAt({ ...far, planes: [] }, 0), new Set([3]));
