@@ -47,9 +47,9 @@ export class Surface {
     return { half, center: half.map((h, k) => this.low[k] + (2 * at[k] + 1) * h) };
   }
 
-  // Estimates which patches are hidden behind others in a view.
-  #hiddenIn(view) {
-    return view.also?.length ? undefined : new Hidden(view, this.covers, (patch) => {
+  // Estimates which patches are hidden behind others in a view: none if a part is cut away (`black`).
+  #hiddenIn(view, { black }) {
+    return black || view.also?.length ? undefined : new Hidden(view, this.covers, (patch) => {
       const { half, center } = this.#cellOf(patch);
       return { center, radius: Math.hypot(...half) };
     });
@@ -81,13 +81,13 @@ export class Surface {
   }
 
   /**
-   * Chooses patches: [{ patch, faces }], ascending. `view`: as for Cut.update(); `want`: { pixels, triangles }; `coarser`: a factor of the allowed error. Also returns the
+   * Chooses patches: [{ patch, faces }], ascending. `view`: as for Cut.update(); `want`: { pixels, triangles, black }; `coarser`: a factor of the allowed error. Also returns the
    * number of triangles, the greatest error of a visible patch in pixels, and the greatest error of all in the model's unit.
    */
   choose(view, want, coarser = 1) {
     const { patches } = this, whole = want.pixels === 0 ? this.mesh && this.info.face_count <= EVERYTHING : this.whole && coarser === 1 && want.pixels <= CELL_PIXELS;
     const share = want.pixels / CELL_PIXELS, allowed = coarser * share * ERROR, most = Math.min(want.triangles, EVERYTHING, TRIANGLES / share);
-    const heap = new Heap(), chosen = [], opened = new Set(), hidden = whole ? undefined : this.#hiddenIn(view);
+    const heap = new Heap(), chosen = [], opened = new Set(), hidden = whole ? undefined : this.#hiddenIn(view, want);
     let triangles = 0;
     // The limit of triangles may be reached before all errors are small enough. Errors are compared by powers of 4. Of similar errors, those of the block with the
     // greatest sum are first, because scattered patches would need most chunks of the file.

@@ -93,11 +93,12 @@ test('below a limit of triangles, patches that are stored together are refined t
 test('patches behind others stay coarser, in a known view', () => {
   const surface = fullTree(10, (level) => 0.06 / 4 ** level), { patches } = surface, s = Math.SQRT1_2;
   const far = { eye: [0, 0, 2.5], planes: [[s, 0, -s, 2.5 * s], [-s, 0, -s, 2.5 * s], [0, -s, -s, 2.5 * s], [0, s, -s, 2.5 * s]], pixels: 2000 };
-  const levelsAt = (v, z) => new Set(surface.choose(v, want).chosen.map(({ patch }) => patches[patch])
+  const levelsAt = (v, z, w = want) => new Set(surface.choose(v, w).chosen.map(({ patch }) => patches[patch])
     .filter(({ level, at }) => Math.floor(at[2] * 4 / 2 ** level) === z).map(({ level }) => level));
   assert.deepEqual(levelsAt(far, 3), new Set([3]));
   assert.deepEqual(levelsAt(far, 0), new Set([2]));
   assert.deepEqual(levelsAt({ ...far, planes: [] }, 0), new Set([3]));
+  assert.deepEqual(levelsAt(far, 0, { ...want, black: true }), new Set([3]), 'what covers them may be cut away');
   assert.ok(surface.choose(far, want).pixels > surface.choose({ ...far, planes: [] }, want).pixels, 'the error of hidden patches counts');
 });
 
