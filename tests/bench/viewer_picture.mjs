@@ -119,7 +119,7 @@ const showMesh = async ({ address, count }) => {
 };
 
 // Makes a plain mesh of three.js with the triangles that the viewer has drawn, in a picture of the same size. Sets window.drawFrames: functions that draw a number of frames and
-// wait until they are drawn: the viewer's, those of the plain mesh with fronts of faces alone, as is usual, and those with both sides, as the viewer draws.
+// wait until they are drawn: the viewer's, those of the plain mesh with fronts of faces alone, the default, and those with both sides, as the viewer draws.
 const preparePlain = async (address) => {
   const { scene } = window.ebpoViewer, THREE = await import(`${address}three.module.js`), { canvas, camera } = scene;
   const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas'), antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true });
