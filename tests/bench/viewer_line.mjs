@@ -3,16 +3,22 @@
 // then, all bytes that the line delivered (fewer if responses are ended early, as the server has sent more), triangles, and the bytes of a second visit.
 // All connections share the line in turns.
 // --kbits 5000   --ms 100 (round trip)   --rounds 9   --pictures FOLDER (of the settled page)   --query TEXT (appended to the URL)   --sources (not bundled)
-// --viewer ROOT (another checkout)   --near 0.03 (another row: the time of a click's distance; then the camera is at this many box diagonals from the point)
+// --viewer ROOT (another checkout)   --mesh MODEL.ply (more rows: the settled picture compared with all faces of the model, and the time of a frame)
+// --tiles FOLDER --modules FOLDER --errors 16,8,4 (with --mesh; another row for each error in pixels: 3D Tiles of the model by ebpo export --tiles, over the same line, by
+// 3d-tiles-renderer and three, which npm has installed in the second folder)
+// --trace (prints each request: ms until it was sent, until the first and the last byte arrived, bytes, range)
+// --near 0.03 (another row: the time of a click's distance; then the camera is at this many box diagonals from the point)
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, symlinkSync } from 'node:fs';
 import { connect, createServer } from 'node:net';
-import { tmpdir } from 'node:os';
+import { loadavg, tmpdir } from 'node:os';
 import { basename, join, resolve } from 'node:path';
 import { pathToFileURL } from 'node:url';
+import { comparePicture } from './viewer_picture.mjs';
 
 const options = {
-  kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, near: 0, viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
+  kbits: 5000, ms: 100, rounds: 9, pictures: undefined, query: '', sources: false, mesh: '', tiles: '', modules: '', errors: '16,8,4', trace: false, near: 0,
+  viewer: resolve(import.meta.dirname ?? new URL('.', import.meta.url).pathname, '../..') }, models = [];
 for (let i = 2; i < process.argv.length; i++) {
   const name = process.argv[i].startsWith('--') ? process.argv[i].slice(2) : undefined;
   if (!name)
@@ -28,6 +34,7 @@ const { chromium } = await import(pathToFileURL(join(viewer, 'node_modules/playw
 const PIECE = 4096, QUEUE = 65536; // bytes of a turn, and bytes that the line stores for a connection
 
 let delivered = 0; // bytes
+const sent = [];   // requests since the last page was opened, for --trace
 // Starts a line from a new port to `to`. It delays every connection and every byte, and limits the rate of bytes. Connections take turns.
 function line(to) {
   const waiting = []; // connections with something to send: { queue, send }
@@ -43,6 +50,11 @@ function line(to) {
     if (next.queue.length)
       waiting.push(next);
     delivered += piece.length;
+    if (next.request) {
+      next.request.bytes += piece.length;
+      next.request.first ??= performance.now();
+      next.request.last = performance.now();
+    }
     next.sent(piece);
     free = Math.max(free, performance.now()) + piece.length * 8 / options.kbits;
     setTimeout(turn, free - performance.now());
@@ -57,7 +69,12 @@ function line(to) {
         later(() => near.end());
     } };
     const ready = performance.now() + options.ms; // after the handshake
-    near.on('data', (data) => setTimeout(() => far.write(data), Math.max(0, ready - performance.now()) + options.ms / 2));
+    near.on('data', (data) => {
+      const [, what, range] = /^GET (\S+)[^]*?(?:\r\nrange: *(\S+)|\r\n\r\n)/i.exec(data.toString('latin1')) ?? [];
+      if (what)
+        sent.push(down.request = { what: what.split('?')[0], range, at: performance.now(), first: undefined, last: undefined, bytes: 0 });
+      setTimeout(() => far.write(data), Math.max(0, ready - performance.now()) + options.ms / 2);
+    });
     far.on('data', (data) => {
       if (!down.queue.length)
         waiting.push(down);
@@ -91,6 +108,8 @@ async function serve() {
   await new Promise((done) => probe.close(done));
   for (const model of models)
     symlinkSync(model, join(work, basename(model)));
+  if (options.tiles)
+    symlinkSync(resolve(options.tiles), join(work, 'tiles'));
   const script = join(root, 'samples/serve.sh'), old = readFileSync(script, 'utf8').includes('--no-install') ? ['--no-install'] : options.sources ? ['--sources'] : [];
   const server = spawn('sh', [script, ...old, '--port', String(port), '--folder', work, '--log', log], { stdio: ['ignore', 'ignore', 'inherit'] });
   cleanup.push(() => new Promise((done) => server.once('exit', done).kill('SIGTERM')));
@@ -127,13 +146,33 @@ const WATCH = `{
 }`;
 
 async function visit(page, address) {
+  const began = performance.now();
+  sent.length = 0;
   await page.goto(address, { waitUntil: 'commit' });
   await page.waitForFunction(() => window.firstPicture, undefined, { timeout: 120000, polling: 50 });
   const first = await page.evaluate(() => window.firstPicture);
   await settle(page);
   const { settled, state } = await page.evaluate(() => ({ settled: performance.now(), state: window.ebpoViewer.state }));
   await page.waitForTimeout(200); // nginx writes its log after a response is sent
-  return { first, settled: settled - 1000, stats: state.stats, ...traffic() };
+  if (options.trace) {
+    const at = (time) => (time === undefined ? '-' : (time - began).toFixed(0)).padStart(6);
+    sent.forEach((r) => console.log(`${at(r.at)}${at(r.first)}${at(r.last)} ${String(r.bytes).padStart(8)} ${r.what} ${r.range ?? ''}`));
+    console.log(`first picture ${first.toFixed(0)}, settled ${(settled - 1000).toFixed(0)}`);
+  }
+  return { first, settled: settled - 1000, stats: state.stats, calls: state.calls, ...traffic() };
+}
+
+// Compares the settled picture with all faces of the model.
+async function compare(page, { stats, calls }) {
+  const tiles = options.tiles ? { url: new URL('models/tiles/tileset.json', page.url()).href, modules: resolve(options.modules), errors: options.errors.split(',').map(Number),
+    delivered: () => delivered } : undefined;
+  const c = await comparePicture(page, resolve(options.mesh), join(viewer, 'node_modules'), tiles), { inside, partly, holes } = c.silhouette;
+  console.log(`  settled: ${stats.triangles} triangles, ${calls} draw calls, error ${stats.surface?.pixels.toFixed(2)} pixels; SSIM with all ${c.faces} faces ${c.ssim.toFixed(4)}; ` +
+    `of ${inside} pixels inside the silhouette ${holes} show the background only, ${partly} in part, ${c.cracks} without backs of faces; ` +
+    `processor time of a frame ${c.frames.own.toFixed(3)} s, of a plain mesh of as many triangles ${c.frames.fronts.toFixed(3)} s, of its both sides ${c.frames.both.toFixed(3)} s; ` +
+    `load ${loadavg()[0].toFixed(1)}`);
+  for (const { error, ms, bytes, triangles, tiles: count, ssim } of c.others)
+    console.log(`  3D Tiles, ${error} pixels: ${seconds(ms)} s, ${kilo(bytes)} kB, ${count} tiles, ${triangles} triangles, SSIM ${ssim.toFixed(4)}`);
 }
 
 // Clicks in the middle and waits for the exact distance; then moves close to that point and waits until the page has settled.
@@ -177,7 +216,7 @@ async function measure(browser, site, model) {
   const rounds = [], address = `${site}?file=models/${basename(model)}&theme=dark${options.query && '&' + options.query}`;
   let again;
   for (let round = 0; round < options.rounds; round++) {
-    const context = await browser.newContext({ viewport: { width: 1200, height: 800 }, reducedMotion: 'reduce' }), page = await context.newPage();
+    const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: 'reduce' }), page = await context.newPage();
     await context.addInitScript(WATCH);
     traffic();
     rounds.push(await visit(page, address));
@@ -189,6 +228,8 @@ async function measure(browser, site, model) {
         if (options.pictures)
           await page.screenshot({ path: join(options.pictures, basename(model).replace('.ebpo.h5', '_near.png')) });
       }
+      if (options.mesh)
+        await compare(page, rounds[0]);
       await page.goto('about:blank');
       again = await visit(page, address);
     }

@@ -2,6 +2,7 @@
 // The test of visibility is not exact, because an error only delays fetching.
 const ACROSS = 48, DOWN = 32;
 const COVERED = 0.8; // a tile counts as covered when nodes cover so much of its area
+const PARALLEL = 1e-5; // in a view that is narrower at distance 1, as those of orthographic cameras are, nothing counts as hidden
 
 const dot = (p, [x, y, z, w]) => x * p[0] + y * p[1] + z * p[2] + w;
 
@@ -12,6 +13,8 @@ export class Hidden {
     if (view.planes.length !== 4)
       return;
     const [a, b] = view.planes.slice(2), across = this.#opening(0), down = this.#opening(2);
+    if (!(Math.min(across, down) > PARALLEL))
+      return;
     this.forward = Math.hypot(...[0, 1, 2].map((k) => view.planes[0][k] + view.planes[1][k]));
     this.tileArea = (across / ACROSS) * (down / DOWN); // at distance 1
     this.depth = new Float64Array(ACROSS * DOWN).fill(Infinity);

@@ -46,6 +46,10 @@ typedef struct ebpo_js_object {
 /* Empties all result arrays. */
 void ebpo_js_clear(ebpo_js_object *object);
 
+/* Sends prefetch hints for a whole array of the root (ebpo_array_id), so that one request fetches
+ * it. */
+void ebpo_js_hint_array(ebpo_js_object *object, int array);
+
 /* Makes `chunks`, unless it exists. */
 EBPO_MUST_USE ebpo_status ebpo_js_need_chunks(ebpo_js_object *object);
 

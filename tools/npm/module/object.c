@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "format/patch_table.h"
+#include "format/reader.h"
 #include "module.h"
 
 /* ---- results ---- */
@@ -149,11 +150,19 @@ int EBPO_JS(ebpo_js_supply)(ebpo_js_object *object, double offset, double size, 
                              &object->error);
 }
 
+void ebpo_js_hint_array(ebpo_js_object *object, int array)
+{
+    ebpo_hints hints = EBPO_HINTS_INIT(object->file);
+    ebpo_hint_array(&hints, ebpo_reader_array(object->file, (ebpo_array_id)array, 0));
+    ebpo_hint_all(&hints);
+}
+
 ebpo_status ebpo_js_need_chunks(ebpo_js_object *object)
 {
-    return object->chunks ? EBPO_OK
-                          : ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory,
-                                             &object->error);
+    if (object->chunks)
+        return EBPO_OK;
+    ebpo_js_hint_array(object, EBPO_A_FACES_INDEX); /* ebpo_chunks_make reads it chunk by chunk */
+    return ebpo_chunks_make(&object->chunks, object->file, object->chunk_memory, &object->error);
 }
 
 ebpo_status ebpo_js_need_mesh(ebpo_js_object *object)

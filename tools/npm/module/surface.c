@@ -12,6 +12,8 @@ enum { PATCH_FACTS = 9 };
 
 static ebpo_status read_table(ebpo_js_object *object)
 {
+    if (!object->patches)
+        ebpo_js_hint_array(object, EBPO_A_SURFACE_PATCHES);
     ebpo_status status = ebpo_js_need_chunks(object);
     if (status == EBPO_OK && !object->patches &&
         !(object->patches = calloc(1, sizeof *object->patches)))

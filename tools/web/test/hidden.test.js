@@ -24,4 +24,8 @@ test('a wall with holes hides less', () => {
   const hidden = new Hidden(view, wall.filter(({ x }) => x < -0.6 || x > -0.5), place);
   assert.ok(!hidden.has(node(-2, 1, -4, 1)));
 });
+test('in a parallel view nothing is hidden', () => {
+  const parallel = { ...view, planes: [[1, 0, 0, 2], [-1, 0, 0, 2], [0, -1, 0, 2], [0, 1, 0, 2]] };
+  assert.ok(!new Hidden(parallel, wall, place).has(node(-1, 0, -2, 0.1)));
+});
 test('without the planes of the view nothing is hidden', () => assert.ok(!new Hidden({ ...view, planes: [] }, wall, place).has(node(-1, 0, -2, 0.1))));

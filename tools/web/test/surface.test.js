@@ -72,6 +72,36 @@ test('few faces in the corner of a cell are not taken for large faces', () => {
   assert.deepEqual(replaced(2000), [true, true]);
 });
 
+// Returns patches of all cells of levels 0 to 3.
+function fullTree(triangles, errorOf) {
+  const patches = [{ level: 0, at: [0, 0, 0] }];
+  for (let i = 0; i < 73; i++)
+    for (let octant = 0; octant < 8; octant++)
+      patches.push({ level: patches[i].level + 1, at: patches[i].at.map((x, k) => 2 * x + ((octant >> k) & 1)) });
+  patches.forEach((p, i) => Object.assign(p, { error: errorOf(p.level, i), triangles, faces: 1e6, child: i < 73 ? 8 * i + 1 : 585, end: i < 73 ? 8 * i + 9 : 585 }));
+  return new Surface({ parts: new Set(), box_size: [1, 1, 1], face_count: 1e9 }, { scale: 1 }, patches, false);
+}
+
+test('below a limit of triangles, patches that are stored together are refined together', () => {
+  const surface = fullTree(500, (level, i) => 0.1 / 4 ** level * (1 + (i * 37 % 64) / 64));
+  const { chosen, triangles } = surface.choose({ ...view, eye: [0, 0, 20], pixels: 30_000 }, { ...want, triangles: 135_000 });
+  const fine = chosen.map(({ patch }) => patch).filter((patch) => patch >= 73), runs = fine.filter((patch) => !fine.includes(patch - 1)).length;
+  assert.ok(triangles <= 135_000 && fine.length > 200, `${fine.length} of 512 patches`);
+  assert.ok(runs <= 5, `${fine.length} patches are in ${runs} places`);
+});
+
+test('patches behind others stay coarser, in a known view', () => {
+  const surface = fullTree(10, (level) => 0.06 / 4 ** level), { patches } = surface, s = Math.SQRT1_2;
+  const far = { eye: [0, 0, 2.5], planes: [[s, 0, -s, 2.5 * s], [-s, 0, -s, 2.5 * s], [0, -s, -s, 2.5 * s], [0, s, -s, 2.5 * s]], pixels: 2000 };
+  const levelsAt = (v, z, w = want) => new Set(surface.choose(v, w).chosen.map(({ patch }) => patches[patch])
+    .filter(({ level, at }) => Math.floor(at[2] * 4 / 2 ** level) === z).map(({ level }) => level));
+  assert.deepEqual(levelsAt(far, 3), new Set([3]));
+  assert.deepEqual(levelsAt(far, 0), new Set([2]));
+  assert.deepEqual(levelsAt({ ...far, planes: [] }, 0), new Set([3]));
+  assert.deepEqual(levelsAt(far, 0, { ...want, black: true }), new Set([3]), 'what covers them may be cut away');
+  assert.ok(surface.choose(far, want).pixels > surface.choose({ ...far, planes: [] }, want).pixels, 'the error of hidden patches counts');
+});
+
 test('a mesh has unit coordinates of the scene, colours and closed edges', async () => {
   for (const faces of [false, true]) {
     const { file, scene, surface } = await load('70_surface_with_subtrees'), wanted = surface.patches.map((_, patch) => ({ patch, faces: faces && patch % 2 === 0 })).slice(1);
