@@ -83,7 +83,7 @@ typedef struct placed {
     double d2, d, gap; /* |x|^2, |x|, and a lower bound of the distance between ball and box */
 } placed;
 
-static placed place(const ebpo_cap_node *n, const ebpo_cap_box *q)
+static placed place_ball(const ebpo_cap_node *n, const ebpo_cap_box *q)
 {
     placed at;
     ebpo_vec3_subtract(n->centre, q->centre, at.x);
@@ -142,7 +142,7 @@ static ebpo_bounded bound_placed(const ebpo_cap_tree *t, const ebpo_cap_node *n,
 static ebpo_bounded bound_node(const ebpo_cap_tree *t, const ebpo_cap_node *n,
                                const ebpo_cap_box *q)
 {
-    const placed at = place(n, q);
+    const placed at = place_ball(n, q);
     return bound_placed(t, n, q, &at);
 }
 
@@ -247,7 +247,7 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
             uint32_t entry = stack[--count];
             ebpo_cap_node own;
             const ebpo_cap_node *n = node_of(tree, entry, &own);
-            const placed at = place(n, box);
+            const placed at = place_ball(n, box);
             ebpo_bounded b = { 0, n->most };
             if (n->radius + box->radius <= FAR * at.gap)
                 b = bound_placed(tree, n, box, &at);
