@@ -691,6 +691,8 @@ static int make_holes(const char *path, double cells, uint64_t one_in)
 {
     const uint8_t corners = 3;
     uint64_t kept = 0;
+    if (!(cells >= 1 && cells < 0x1p21) || one_in == 0)
+        fail("expected CELLS from 1 to 2^21 - 1, and ONE_IN of at least 1");
     read_ply(path);
     find_box();
     for (uint64_t i = 0; i < m.faces; i++)
