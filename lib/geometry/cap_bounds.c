@@ -12,6 +12,13 @@
  * + s) / g^3, because the differences x - p form a convex set, in which the norm is at least g. The
  * half angle of a triangle is also at most pi.
  *
+ * Second order. Let X = c - q, d = |X| >= g, and f' the derivative of f at X, a symmetric matrix.
+ * Its product with V has the norm sqrt(|V|^2 + 3 (V . X / d)^2) / d^3. The norm of the difference
+ * between x - p and X is at most |x - c| + s, and the norm of the second derivative of f is at most
+ * 6 / g^4. So the half angle differs from half of V . f(X) + I, where I is the integral of (f' (x -
+ * c)) . dA, by at most s |f' V| / 2 + 1.5 a (D + s)^2 / g^4. D is the root mean square of |x - c|
+ * over the area. With the matrix M = `moment`, I = a R (trace M - 3 X^T M X / d^2) / d^3.
+ *
  * Border edges. Away from the faces of S, w_S is smooth, also on caps. The gradient of 4 pi w_S is
  * the integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of
  * length l at the distance d contributes at most l / d^2, and at most 2 / d, the value of a whole
@@ -20,9 +27,11 @@
  * bound of the derivative of f.
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V; `slack` bounds
- * the error of V. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances are used
- * only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900 may underflow. They
- * change the results by less than the constants TINY and 2^-500, which are added. */
+ * the error of V, so it changes I by at most 5 `slack` / d^2. Rounding to float changes I by at
+ * most 2^-20 a R / d^3. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances
+ * are used only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900 may
+ * underflow. They change the results by less than the constants TINY and 2^-500, which are added.
+ */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -68,28 +77,73 @@ static double gap_between(const ebpo_cap_node *n, const ebpo_cap_box *q, const d
     return distance * (1 - 0x1p-40) - n->radius * ENLARGE;
 }
 
-/* Bounds the sum of the half angles of a node's triangles. *gap_out: a lower bound of the distance
- * between the node's ball and the box, or a value below DISTANCE_MIN. */
-static ebpo_bounded bound_node(const ebpo_cap_node *n, const ebpo_cap_box *q, double *gap_out)
+/* The position of a node's ball relative to a box. */
+typedef struct placed {
+    double x[3];       /* the ball's centre minus the box's centre */
+    double d2, d, gap; /* |x|^2, |x|, and a lower bound of the distance between ball and box */
+} placed;
+
+static placed place_ball(const ebpo_cap_node *n, const ebpo_cap_box *q)
+{
+    placed at;
+    ebpo_vec3_subtract(n->centre, q->centre, at.x);
+    at.d2 = ebpo_vec3_dot(at.x, at.x);
+    at.d = sqrt(at.d2);
+    at.gap = gap_between(n, q, at.x, at.d);
+    return at;
+}
+
+/* bound_first_order and bound_second_order bound the sum of the half angles of a node's triangles.
+ * `inverse`: 1 / gap^2. */
+static ebpo_bounded bound_first_order(const ebpo_cap_node *n, const ebpo_cap_box *q,
+                                      const placed *at, double inverse)
+{
+    double ball = (n->radius + q->radius) * ENLARGE;
+    return (ebpo_bounded){ ebpo_vec3_dot(n->vector, at->x) / (at->d2 * at->d) / 2,
+                           (n->area * (ball / at->gap + 0x1p-44) + n->slack) * inverse };
+}
+
+static ebpo_bounded bound_second_order(const ebpo_cap_node *n, const ebpo_cap_box *q,
+                                       const placed *at, double inverse)
+{
+    const float *m = n->moment;
+    double u[3], unit = 1 / at->d, square = unit * unit / 2, ratio = n->radius * unit,
+                 spread = n->spread * n->radius + q->radius, moving = 0;
+    for (int k = 0; k < 3; k++)
+        u[k] = at->x[k] * unit;
+    double along = ebpo_vec3_dot(n->vector, u),
+           moment = (double)m[0] + m[1] + m[2] -
+                    3 * (m[0] * u[0] * u[0] + m[1] * u[1] * u[1] + m[2] * u[2] * u[2] +
+                         2 * (m[3] * u[0] * u[1] + m[4] * u[1] * u[2] + m[5] * u[2] * u[0]));
+    if (q->radius > 0)
+        moving = sqrt(ebpo_vec3_dot(n->vector, n->vector) + 3 * along * along) * q->radius * unit;
+    double rounding = n->area * (0x1p-21 * ratio + 0x1p-40) + 4 * n->slack;
+    return (ebpo_bounded){ (along + n->area * ratio * moment) * square,
+                           moving * square +
+                               (n->area * (1.5 * spread * spread * inverse) + rounding) * inverse };
+}
+
+/* Bounds the same sum by the bound of the tree's order, the area and the weights. */
+static ebpo_bounded bound_placed(const ebpo_cap_tree *t, const ebpo_cap_node *n,
+                                 const ebpo_cap_box *q, const placed *at)
 {
     const ebpo_bounded unknown = { 0, n->most };
-    double x[3];
-    ebpo_vec3_subtract(n->centre, q->centre, x);
-    double d2 = ebpo_vec3_dot(x, x), d = sqrt(d2), ball = (n->radius + q->radius) * ENLARGE,
-           gap = gap_between(n, q, x, d);
-    *gap_out = gap;
-    if (!(gap > DISTANCE_MIN) || !(d < DISTANCE_MAX))
+    if (!(at->gap > DISTANCE_MIN) || !(at->d < DISTANCE_MAX))
         return unknown;
-    double inverse = 1 / (gap * gap), simple = n->area * inverse / 2,
-           middle = ebpo_vec3_dot(n->vector, x) / (d2 * d) / 2,
-           error = (n->area * (ball / gap + 0x1p-44) + n->slack) * inverse;
-    if (!(error < simple)) {
-        middle = 0;
-        error = simple;
-    }
-    error = error * ENLARGE + TINY;
-    return error < n->most && fabs(middle) <= 2 * n->most ? (ebpo_bounded){ middle, error }
-                                                          : unknown;
+    double inverse = 1 / (at->gap * at->gap), simple = n->area * inverse / 2;
+    ebpo_bounded b = t->second_order ? bound_second_order(n, q, at, inverse)
+                                     : bound_first_order(n, q, at, inverse);
+    if (!(b.error < simple))
+        b = (ebpo_bounded){ 0, simple };
+    b.error = b.error * ENLARGE + TINY;
+    return b.error < n->most && fabs(b.middle) <= 2 * n->most ? b : unknown;
+}
+
+static ebpo_bounded bound_node(const ebpo_cap_tree *t, const ebpo_cap_node *n,
+                               const ebpo_cap_box *q)
+{
+    const placed at = place_ball(n, q);
+    return bound_placed(t, n, q, &at);
 }
 
 /* Bounds the half angle of a stretch's triangle at a point. Computes in 512 bits if doubles do not
@@ -166,9 +220,8 @@ ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], d
     while (count > 0) {
         uint32_t entry = stack[--count];
         const ebpo_cap_node *n = &tree->node[entry & ~EBPO_CAP_TRIANGLE];
-        double gap;
         bool triangle = entry & EBPO_CAP_TRIANGLE;
-        ebpo_bounded b = triangle ? bound_triangle(tree, n, p) : bound_node(n, &q, &gap);
+        ebpo_bounded b = triangle ? bound_triangle(tree, n, p) : bound_node(tree, n, &q);
         if (triangle || b.error <= tolerance)
             add_bounded(&sum, b);
         else
@@ -185,6 +238,8 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
 {
     uint32_t stack[STACK];
     uint64_t before = lists->count;
+    if (begin < end)
+        ebpo_cap_list_prefetch(tree, lists->entry + begin, end - begin);
     for (uint64_t i = begin; i < end; i++) {
         uint32_t count = 1;
         stack[0] = lists->entry[i];
@@ -192,9 +247,11 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
             uint32_t entry = stack[--count];
             ebpo_cap_node own;
             const ebpo_cap_node *n = node_of(tree, entry, &own);
-            double gap;
-            ebpo_bounded b = bound_node(n, box, &gap);
-            if (b.error < n->most && n->radius + box->radius <= FAR * gap) {
+            const placed at = place_ball(n, box);
+            ebpo_bounded b = { 0, n->most };
+            if (n->radius + box->radius <= FAR * at.gap)
+                b = bound_placed(tree, n, box, &at);
+            if (b.error < n->most) {
                 add_bounded(far, b);
             } else if (n->radius > box->radius && has_parts(tree, entry)) {
                 count += find_parts(tree, entry, stack + count);
@@ -218,8 +275,7 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
 static ebpo_bounded bound_entry(const ebpo_cap_front *f, uint32_t entry)
 {
     ebpo_cap_node own;
-    double gap;
-    return bound_node(node_of(f->tree, entry, &own), &f->box, &gap);
+    return bound_node(f->tree, node_of(f->tree, entry, &own), &f->box);
 }
 
 void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, const ebpo_cap_box *box,
@@ -230,6 +286,7 @@ void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, cons
     front->done = far;
     front->count = 0;
     front->touched = count > EBPO_CAP_FRONT;
+    ebpo_cap_list_prefetch(tree, entry, count);
     for (uint64_t i = 0; i < count; i++) {
         bool triangle = box->radius == 0 && entry[i] & EBPO_CAP_TRIANGLE;
         ebpo_bounded b =

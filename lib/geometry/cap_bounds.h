@@ -63,6 +63,17 @@ ebpo_cap_decision ebpo_cap_decide_near(const ebpo_cap_tree *tree, const ebpo_nea
                                        const uint32_t *disc, const double p[3], int32_t winding,
                                        const ebpo_cap_rule *rule);
 
+/* Requests the nodes of a list from memory, before a loop over the list. */
+static inline void ebpo_cap_list_prefetch(const ebpo_cap_tree *tree, const uint32_t *entry,
+                                          uint64_t count)
+{
+    for (uint64_t i = 0; i < count; i++) {
+        const ebpo_cap_node *n = &tree->node[entry[i] & ~EBPO_CAP_TRIANGLE];
+        __builtin_prefetch(n);
+        __builtin_prefetch(&n->slack);
+    }
+}
+
 /* Returns false if certainly no cap of the list touches the box. */
 bool ebpo_cap_list_near(const ebpo_cap_tree *tree, const uint32_t *entry, uint64_t count,
                         const double low[3], const double high[3]);

@@ -19,6 +19,42 @@ static const double ENLARGE = 1 + 0x1p-40;
 
 /* --- construction --- */
 
+/* Integrals over triangles, of the difference x between the triangles' points and a centre. */
+typedef struct cap_moments {
+    double mean[3];   /* of weight * x */
+    double square;    /* of weight * |x|^2 */
+    double matrix[6]; /* of weight * x * normal^T: the symmetric part, as ebpo_cap_node.moment */
+} cap_moments;
+
+/* Adds the integrals over the triangles of a node to `sum`, whose centre is `centre`. The centre of
+ * `of` is that of the node. */
+static void add_moments(cap_moments *sum, const double centre[3], const ebpo_cap_node *n,
+                        const cap_moments *of)
+{
+    double d[3];
+    ebpo_vec3_subtract(n->centre, centre, d);
+    sum->square += of->square + 2 * ebpo_vec3_dot(d, of->mean) + ebpo_vec3_dot(d, d) * n->area;
+    for (int k = 0; k < 3; k++) {
+        int j = k == 2 ? 0 : k + 1;
+        sum->mean[k] += of->mean[k] + d[k] * n->area;
+        sum->matrix[k] += of->matrix[k] + d[k] * n->vector[k];
+        sum->matrix[3 + k] += of->matrix[3 + k] + (d[k] * n->vector[j] + d[j] * n->vector[k]) / 2;
+    }
+}
+
+/* Sets `spread` and `moment` of a node by integrals with the node's centre. The rounding errors of
+ * the integrals are below 2^-40 area * radius^2 (square) and 2^-40 area * radius (matrix). */
+static void set_moments(ebpo_cap_node *n, const cap_moments *of)
+{
+    double unit = n->area * n->radius, unit2 = unit * n->radius,
+           square = of->square / unit2 + 0x1p-36;
+    n->spread = !(unit2 > 0x1p-900) ? INFINITY /* `square` may underflow */
+                : square < 0.999    ? (float)sqrt(square) * (1 + 0x1p-20f)
+                                    : 1;
+    for (int k = 0; k < 6; k++)
+        n->moment[k] = unit > 0 ? (float)(of->matrix[k] / unit) : 0;
+}
+
 typedef struct growing {
     ebpo_cap_tree *tree;
     const uint64_t *first;  /* [loops + 1] first position of each loop */
@@ -58,10 +94,10 @@ static void add_part(ebpo_cap_node *n, const ebpo_cap_node *part)
         n->vector[k] += part->vector[k];
 }
 
-/* Sets the sums of the node to the sums of the triangle (from, m, to). The rounding error of the
- * triangle's vector area is below 2^-49 times the product of two edges. The square of an area may
- * underflow, so lengths are scaled. */
-static void set_triangle(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t m)
+/* Sets the sums of the node to the sums of the triangle (from, m, to), and `moments` to its
+ * integrals with the node's centre. The rounding error of the triangle's vector area is below 2^-49
+ * times the product of two edges. The square of an area may underflow, so lengths are scaled. */
+static void set_triangle(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t m, cap_moments *moments)
 {
     double u[3], v[3], cross[3], weight = n->weight;
     ebpo_vec3_subtract(t->position[m], t->position[n->from], u);
@@ -72,6 +108,15 @@ static void set_triangle(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t m)
     n->most = weight * EBPO_PI_HIGH * ENLARGE;
     for (int k = 0; k < 3; k++)
         n->vector[k] = weight * cross[k] / 2;
+    /* the integrals with the centroid (u + v) / 3 as centre, then with the node's centre */
+    ebpo_cap_node at_centroid = *n;
+    for (int k = 0; k < 3; k++)
+        at_centroid.centre[k] = t->position[n->from][k] + (u[k] + v[k]) / 3;
+    cap_moments of = {
+        .square = n->area * (ebpo_vec3_dot(u, u) + ebpo_vec3_dot(v, v) - ebpo_vec3_dot(u, v)) / 18
+    };
+    *moments = (cap_moments){ .square = 0 };
+    add_moments(moments, n->centre, &at_centroid, &of);
 }
 
 void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stretch,
@@ -80,11 +125,13 @@ void ebpo_cap_triangle_node(const ebpo_cap_tree *tree, const ebpo_cap_node *stre
     uint64_t m = ebpo_cap_middle(stretch->from, stretch->to),
              at[3] = { stretch->from, m, stretch->to };
     double corner[3][3];
+    cap_moments moments;
     *out = (ebpo_cap_node){ .from = stretch->from, .to = stretch->to, .weight = stretch->weight };
     for (int i = 0; i < 3; i++)
         ebpo_vec3_copy(tree->position[at[i]], corner[i]);
     enclose_positions(out, corner, 3);
-    set_triangle(tree, out, m);
+    set_triangle(tree, out, m, &moments);
+    set_moments(out, &moments);
 }
 
 /* Adds the length of a border edge to a node. */
@@ -96,14 +143,17 @@ static void add_edge(const ebpo_cap_tree *t, ebpo_cap_node *n, uint64_t i, uint6
 }
 
 /* Makes the nodes of the stretch from position i to position j, in preorder: the order in which
- * ebpo_cap_triangle numbers triangles. Recursive, at most 32 deep. */
-static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weight)
+ * ebpo_cap_triangle numbers triangles. Sets `moments` to the integrals of the first node.
+ * Recursive, at most 32 deep. */
+static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weight,
+                         cap_moments *moments)
 {
+    cap_moments of_half;
     ebpo_cap_node *n = &t->node[t->node_count++];
     uint64_t m = ebpo_cap_middle(i, j);
     *n = (ebpo_cap_node){ .from = (uint32_t)i, .to = (uint32_t)j, .weight = weight };
     enclose_positions(n, t->position + i, j - i + 1);
-    set_triangle(t, n, m);
+    set_triangle(t, n, m, moments);
     for (int half = 0; half < 2; half++) {
         uint64_t a = half ? m : i, b = half ? j : m;
         if (ebpo_cap_count(a, b) == 0) {
@@ -111,9 +161,11 @@ static void make_stretch(ebpo_cap_tree *t, uint64_t i, uint64_t j, uint32_t weig
             continue;
         }
         const ebpo_cap_node *part = &t->node[t->node_count];
-        make_stretch(t, a, b, weight);
+        make_stretch(t, a, b, weight, &of_half);
         add_part(n, part);
+        add_moments(moments, n->centre, part, &of_half);
     }
+    set_moments(n, moments);
 }
 
 /* Returns the mean coordinate of a loop's first and middle vertex on the axis, which roughly
@@ -171,14 +223,16 @@ static int longest_axis(const growing *g, uint64_t begin, uint64_t end)
     return side[0] >= side[1] && side[0] >= side[2] ? 0 : side[1] >= side[2] ? 1 : 2;
 }
 
-/* Makes the nodes of the loops order[begin .. end). Recursive: each half has half of the loops. */
-static void make_group(growing *g, uint64_t begin, uint64_t end)
+/* Makes the nodes of the loops order[begin .. end). Sets `moments` to the integrals of the first
+ * node. Recursive: each half has half of the loops. */
+static void make_group(growing *g, uint64_t begin, uint64_t end, cap_moments *moments)
 {
     ebpo_cap_tree *t = g->tree;
+    cap_moments of_half[2];
     if (end - begin == 1) {
         uint64_t loop = g->order[begin];
         ebpo_cap_node *n = &t->node[t->node_count];
-        make_stretch(t, g->first[loop], g->first[loop + 1] - 1, g->weight[loop]);
+        make_stretch(t, g->first[loop], g->first[loop + 1] - 1, g->weight[loop], moments);
         add_edge(t, n, n->to, n->from);
         return;
     }
@@ -187,7 +241,7 @@ static void make_group(growing *g, uint64_t begin, uint64_t end)
     divide_loops(g, begin, end, longest_axis(g, begin, end));
     for (int half = 0; half < 2; half++) {
         uint64_t middle = begin + (end - begin) / 2, at = t->node_count;
-        make_group(g, half ? middle : begin, half ? end : middle);
+        make_group(g, half ? middle : begin, half ? end : middle, &of_half[half]);
         *(half ? &n->to : &n->from) = (uint32_t)at;
         add_part(n, &t->node[at]);
     }
@@ -199,6 +253,10 @@ static void make_group(growing *g, uint64_t begin, uint64_t end)
     double radius_a = ebpo_vec3_length(d) + a->radius;
     ebpo_vec3_subtract(b->centre, n->centre, d);
     n->radius = fmax(radius_a, ebpo_vec3_length(d) + b->radius) * ENLARGE + 0x1p-500;
+    *moments = (cap_moments){ .square = 0 };
+    add_moments(moments, n->centre, a, &of_half[0]);
+    add_moments(moments, n->centre, b, &of_half[1]);
+    set_moments(n, moments);
 }
 
 ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3], const uint64_t *first,
@@ -209,18 +267,20 @@ ebpo_status ebpo_cap_tree_make(ebpo_cap_tree *out, double (*position)[3], const 
         return EBPO_OK;
     uint64_t positions = first[loop_count], triangles = positions - 2 * loop_count;
     growing g = { out, first, weight, ebpo_alloc(loop_count, sizeof *g.order) };
+    cap_moments all;
     ebpo_status status = EBPO_OK;
     if (positions > INT32_MAX)
         status = ebpo_fail(error, EBPO_E_LIMIT, "%llu border edges, but 2^31 is the limit",
                            (unsigned long long)positions);
-    else if (!g.order || !(out->node = ebpo_alloc(triangles + loop_count - 1, sizeof *out->node)))
+    else if (!g.order ||
+             !(out->node = ebpo_alloc_lines(triangles + loop_count - 1, sizeof *out->node)))
         status = ebpo_fail_memory(error, (triangles + loop_count) * sizeof *out->node);
     if (status == EBPO_OK) {
         for (uint64_t i = 0; i < loop_count; i++)
             g.order[i] = i;
         out->position_count = positions;
         out->triangle_count = triangles;
-        make_group(&g, 0, loop_count);
+        make_group(&g, 0, loop_count, &all);
     } else {
         ebpo_cap_tree_free(out);
     }

@@ -32,7 +32,11 @@ typedef struct ebpo_cap_node {
     double most;       /* pi times the sum of the weights: bounds the sum of the half angles */
     uint32_t from, to; /* a stretch: positions in ebpo_cap_tree.position; a group: its two nodes */
     uint32_t weight;   /* weight of the stretch's loop; 0: a group */
-    uint32_t spare;    /* unused */
+    /* `spread` and `moment` are means over the area. Let y be the difference between a point of the
+     * triangles and the centre, divided by the radius. `spread`: upper bound of the root mean
+     * square of |y|; INFINITY: area and radius are too small. `moment`: the symmetric part of the
+     * mean of the matrix y normal^T (xx, yy, zz, xy, yz, zx), within 2^-24 */
+    float spread, moment[6];
 } ebpo_cap_node;
 
 typedef struct ebpo_cap_tree {
@@ -41,6 +45,9 @@ typedef struct ebpo_cap_tree {
     ebpo_cap_node *node; /* NULL: no loops */
     uint64_t node_count;
     uint64_t triangle_count;
+    /* true: bounds are of the second order, which is sharper (cap_bounds.c). False by default:
+     * levels of files depend on bounds of the first order */
+    bool second_order;
 } ebpo_cap_tree;
 
 /* Bytes of a tree for each point of its loops: a position and at most one node. */

@@ -50,6 +50,7 @@ ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *file, double thre
         free(h);
         return status;
     }
+    h->caps.second_order = true;
     h->rule = (ebpo_cap_rule){ (uint8_t)info->rule, threshold };
     *out = h;
     return EBPO_OK;
@@ -471,6 +472,7 @@ int32_t ebpo_holes_list_crossings(const ebpo_holes *holes, const ebpo_node_table
                                   const double p[3])
 {
     int32_t sum = 0;
+    ebpo_cap_list_prefetch(&holes->caps, table->disc + cell->first, cell->count);
     for (uint32_t i = 0; i < cell->count; i++)
         sum += ebpo_cap_path_crossings(&holes->caps, table->disc[cell->first + i], low, p);
     return sum;

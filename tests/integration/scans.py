@@ -5,11 +5,18 @@
 
 FOLDER contains PLY files. `shapes` in its place: small surfaces that are made here, and 200 sets of random faces. Of
 each model POINTS points (of a set: a twentieth) are judged by exact rays and solid angles of a cone over the border;
-FULL of these also by sums over all faces. All results must be equal, with the model in memory and in 256 MiB.
-EBPO_TEST_SCALE reduces both counts, and the number of sets.
+FULL of these also by sums over all faces. All results must be equal: with the model in memory, in 256 MB, and by URL in
+256 MB (not of a set). EBPO_TEST_SCALE reduces both counts, and the number of sets.
+
+A model of 25 million faces with 10^5 border edges:
+
+    ebpo-generate --base lucy100k.ply --subdivide 4 lucy.ply
+    winding_judge holes lucy.ply 200 48 >FOLDER/holed.ply
+    scans.py EBPO JUDGE FOLDER 10000 100 holed
 """
 import array
 import math
+import mmap
 import os
 import pathlib
 import random
@@ -18,6 +25,9 @@ import subprocess
 import sys
 import tempfile
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
+import ranges_server
 
 EBPO, JUDGE, FOLDER = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 SCALE = float(os.environ.get("EBPO_TEST_SCALE", "1"))
@@ -79,21 +89,28 @@ def write_ply(path, triangles):
 def judge(name, source, count=POINTS):
     """Judges points in a model. Returns the number of problems."""
     with tempfile.TemporaryDirectory() as folder:
-        file, points, results, within = (pathlib.Path(folder) / n for n in ("m.ebpo.h5", "points", "m.npy", "w.npy"))
+        file, points, results = (pathlib.Path(folder) / n for n in ("m.ebpo.h5", "points", "m.npy"))
         subprocess.run([EBPO, "convert", "--quiet", str(source), str(file)], check=True, stderr=subprocess.DEVNULL)
         with open(points, "wb") as out:
             run(JUDGE, "points", source, count, 1, stdout=out)
-        for target, memory in ((results, []), (within, ["--memory", "256M"])):
-            with open(target, "wb") as out:
-                run(EBPO, "inside", "--raw", "--npy", *memory, file, points, stdout=out)
+        inside = (EBPO, "inside", "--raw", "--npy")
+        with open(results, "wb") as out:
+            run(*inside, file, points, stdout=out)
+        others = {"in 256 MB": run(*inside, "--memory", "256M", file, points)}
+        if not name.startswith("soup"):
+            with open(file, "rb") as f:
+                server = ranges_server.start(mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ))
+            others["by URL"] = run(*inside, "--memory", "256M", ranges_server.url_of(server), points)
+            server.shutdown()
         begin = time.time()
         done = subprocess.run([JUDGE, "check", str(source), str(points), str(results), str(FULL)],
                               stdout=subprocess.PIPE, text=True)
         print(f"{name}: {count} points, {done.stdout.strip()} ({time.time() - begin:.0f} s)", flush=True)
         problems = done.returncode != 0
-        if results.read_bytes() != within.read_bytes():
-            print(f"{name}: results in 256 MiB differ")
-            problems += 1
+        for how, other in others.items():
+            if results.read_bytes() != other:
+                print(f"{name}: results {how} differ")
+                problems += 1
         return problems
 
 

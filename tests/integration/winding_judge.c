@@ -2,6 +2,7 @@
  *
  *     winding_judge points MODEL.ply COUNT SEED >POINTS
  *     winding_judge check MODEL.ply POINTS RESULTS.npy FULL
+ *     winding_judge holes MODEL.ply CELLS ONE_IN >HOLED.ply
  *
  * MODEL.ply is binary, with float vertices and triangles. POINTS has three doubles for each point:
  * of the box, of faces, of the border and their neighbours. RESULTS.npy is the output of `ebpo
@@ -13,7 +14,11 @@
  * that of the cone alone. k is a sum of exact crossings of a vertical ray; c is a sum of solid
  * angles in doubles with an error bound, near 1/2 in long doubles, then in 320 bits. For the first
  * FULL points, and for points on edges of the cone, w is also the sum over all faces. Prints
- * counts; ends with 1 if results differ. */
+ * counts; ends with 1 if results differ.
+ *
+ * `holes` makes holes in a large model: a grid has CELLS cells along the longest side of the box,
+ * and the faces whose first corner is in a chosen cell are omitted. One cell in ONE_IN is chosen.
+ */
 #include <gmp.h>
 #include <inttypes.h>
 #include <math.h>
@@ -469,11 +474,8 @@ static void make_grid(void)
     }
 }
 
-static void open_model(const char *path)
+static void find_box(void)
 {
-    read_ply(path);
-    join_positions();
-    find_border();
     for (int k = 0; k < 3; k++) {
         m.low[k] = INFINITY;
         m.high[k] = -INFINITY;
@@ -483,6 +485,14 @@ static void open_model(const char *path)
             m.low[k] = fmin(m.low[k], m.at[m.face[i]][k]);
             m.high[k] = fmax(m.high[k], m.at[m.face[i]][k]);
         }
+}
+
+static void open_model(const char *path)
+{
+    read_ply(path);
+    join_positions();
+    find_border();
+    find_box();
     for (int k = 0; k < 3; k++)
         m.apex[k] = m.low[k] + (m.high[k] - m.low[k]) * (0.4142 + 0.1 * k);
 }
@@ -662,8 +672,51 @@ static void choose(double p[3])
     }
 }
 
+/* --- holes --- */
+
+static bool is_in_hole(const double p[3], double cells, uint64_t one_in)
+{
+    double size = 0;
+    uint64_t cell = 0;
+    for (int k = 0; k < 3; k++)
+        size = fmax(size, m.high[k] - m.low[k]);
+    for (int k = 0; k < 3; k++)
+        cell = (cell << 21) + (uint64_t)((p[k] - m.low[k]) / size * cells);
+    cell = (cell ^ cell >> 31) * UINT64_C(0x9e3779b97f4a7c15); /* a hash */
+    cell = (cell ^ cell >> 29) * UINT64_C(0xbf58476d1ce4e5b9);
+    return (cell >> 32) % one_in == 0;
+}
+
+static int make_holes(const char *path, double cells, uint64_t one_in)
+{
+    const uint8_t corners = 3;
+    uint64_t kept = 0;
+    if (!(cells >= 1 && cells < 0x1p21) || one_in == 0)
+        fail("expected CELLS from 1 to 2^21 - 1, and ONE_IN of at least 1");
+    read_ply(path);
+    find_box();
+    for (uint64_t i = 0; i < m.faces; i++)
+        if (!is_in_hole(m.at[m.face[3 * i]], cells, one_in))
+            memmove(m.face + 3 * kept++, m.face + 3 * i, 3 * sizeof *m.face);
+    printf("ply\nformat binary_little_endian 1.0\nelement vertex %" PRIu64
+           "\nproperty float x\nproperty float y\nproperty float z\nelement face %" PRIu64
+           "\nproperty list uchar int vertex_indices\nend_header\n",
+           m.vertices, kept);
+    for (uint64_t i = 0; i < m.vertices; i++) {
+        const float p[3] = { (float)m.at[i][0], (float)m.at[i][1], (float)m.at[i][2] };
+        fwrite(p, sizeof p, 1, stdout);
+    }
+    for (uint64_t i = 0; i < kept; i++) {
+        fwrite(&corners, 1, 1, stdout);
+        fwrite(m.face + 3 * i, 12, 1, stdout);
+    }
+    return ferror(stdout) || fclose(stdout) != 0 ? 2 : 0;
+}
+
 int main(int count, char **argument)
 {
+    if (count == 5 && strcmp(argument[1], "holes") == 0)
+        return make_holes(argument[2], strtod(argument[3], NULL), strtoull(argument[4], NULL, 10));
     if (count == 5 && strcmp(argument[1], "points") == 0) {
         open_model(argument[2]);
         state = strtoull(argument[4], NULL, 10);
@@ -676,7 +729,8 @@ int main(int count, char **argument)
         return fclose(stdout) == 0 ? 0 : 2;
     }
     if (count != 6 || strcmp(argument[1], "check") != 0)
-        fail("usage: points MODEL.ply COUNT SEED, or check MODEL.ply POINTS RESULTS.npy FULL");
+        fail("usage: points MODEL.ply COUNT SEED, check MODEL.ply POINTS RESULTS.npy FULL, or "
+             "holes MODEL.ply CELLS ONE_IN");
     big_begin();
     open_model(argument[2]);
     return check(argument[3], argument[4], strtoull(argument[5], NULL, 10));
