@@ -204,6 +204,7 @@ def arrays(file):
     if "subtrees" in listed_parts:
         names += ["/subtrees/index", "/subtrees/counts", "/subtrees/chunk_directory"]
         names += ["/subtrees/shared_chunks"] * ("shared_chunks" in file["/subtrees"])
+        names += ["/subtrees/checksums"] * (checksum_list(file) == "/subtrees/checksum_index")
     out.update({name: file[name] for name in names})
     return out
 
@@ -346,7 +347,7 @@ ROOT_PATHS = {4096: "/mesh/vertices", 4097: "/mesh/faces", 4098: "/mesh/faces_in
               4103: "/surface/patches", 4104: "/surface/triangles", 4105: "/surface/points", 4106: "/surface/normals",
               4107: "/surface/colours",
               4112: "/subtrees/index",
-              4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks"}
+              4113: "/subtrees/counts", 4114: "/subtrees/shared_chunks", 4117: "/subtrees/checksums"}
 
 
 def path_of(number):
@@ -405,33 +406,80 @@ def check_frames(file):
                 check_frame(dataset.id.read_direct_chunk(dataset.id.get_chunk_info(i).chunk_offset)[1], path)
 
 
+def checksum_list(file):
+    """checksums.md, sections 3 and 4: the list of checksums that is not to be ignored, if any."""
+    for path in "/subtrees/checksum_index", "/chunk_checksums":
+        if path in file and holds(file, path) and file[path].id.get_create_plist().get_nfilters():  # bare: no checksums
+            return path
+    return None
+
+
+def paged_arrays(file):
+    """checksums.md, section 4: {number: array}, of those whose chunks are in /subtrees/checksums."""
+    if checksum_list(file) != "/subtrees/checksum_index":
+        return {}
+    blocks, deep = len(file["/subtrees/index"]), 64 * (one(file.attrs["subtree_level"]) + 1)
+    numbers = [n for n in range(deep, 4096) if n % 64 not in (10, 11, 12)] + [4096, 4097, 4099, 4100]
+    called = arrays(file)
+    return {n: called[path_of(n)] for n in numbers
+            if path_of(n) in called and called[path_of(n)].id.get_num_chunks() > blocks}
+
+
+def rows_before(file, number, block):
+    """The rows of a paged array before the subtrees of a chunk of /subtrees/counts."""
+    row = [int(v) for v in file["/subtrees/index"][block]]
+    if number >= 4096:
+        return row[0] + row[1] if number in (4097, 4100) else row[2] + row[3]
+    k = number // 64 - one(file.attrs["subtree_level"]) - 1
+    gray, leaf, black, planes, leaf_planes, refs = row[6 + 7 * k:12 + 7 * k]
+    groups = row[6 + 7 * (k - 1)] if k else block * file["/subtrees/counts"].chunks[0]
+    return {"types": groups, "plane_counts": gray, "gray_colours": gray, "planes": planes, "black_winding": black,
+            "white_winding": 8 * groups - gray - leaf - black, "leaf_refs": refs,
+            "leaf_planes": leaf_planes}.get(LEVEL_NAMES[number % 64], leaf)
+
+
+def paged_order(file):
+    """checksums.md, section 4: (number, chunk) of each row of /subtrees/checksums."""
+    paged = paged_arrays(file)
+    done, blocks = dict.fromkeys(paged, 0), len(file["/subtrees/index"])
+    for block in range(blocks):
+        for number, array in paged.items():
+            while done[number] < array.id.get_num_chunks() and (
+                    block + 1 == blocks or done[number] * array.chunks[0] < rows_before(file, number, block + 1)):
+                yield number, done[number]
+                done[number] += 1
+
+
 def check_sums(file):
-    """checksums.md, section 3: each chunk of the arrays that the head calls for ends as the list says."""
-    if "chunk_checksums" not in file or not holds(file, "/chunk_checksums"):
+    """checksums.md, sections 3 and 4: each chunk of the arrays that the head calls for ends as the list says."""
+    path_of_list = checksum_list(file)
+    if not path_of_list:
         return
-    if not file["chunk_checksums"].id.get_create_plist().get_nfilters():  # bare: no checksums
-        return
-    numbers, sums = np.divmod(file["/chunk_checksums"][...], np.uint64(1 << 32))
-    assert (numbers[:-1] <= numbers[1:]).all(), "chunk_checksums: not in order"
-    listed_paths = {path_of(int(number)): int(number) for number in np.unique(numbers)}
-    stored = pathlib.Path(file.filename).read_bytes()
+    numbers, sums = np.divmod(file[path_of_list][...], np.uint64(1 << 32))
+    assert (numbers[:-1] <= numbers[1:]).all(), "checksums: not in order"
+    stored, ends = pathlib.Path(file.filename).read_bytes(), {}
     for path, dataset in arrays(file).items():
-        if path != "/subtrees/chunk_directory":
-            chunks = [dataset.id.get_chunk_info(i) for i in range(dataset.id.get_num_chunks())]
-            ends = [int.from_bytes(stored[c.byte_offset:c.byte_offset + c.size][-4:], "little") for c in chunks]
-            assert ends == sums[numbers == listed_paths[path]].tolist(), f"{path}: another chunk's bytes"
+        chunks = [dataset.id.get_chunk_info(i) for i in range(dataset.id.get_num_chunks())]
+        ends[path] = [int.from_bytes(stored[c.byte_offset:c.byte_offset + c.size][-4:], "little") for c in chunks]
+    paged = paged_arrays(file)
+    of_list = {path_of(int(number)): int(number) for number in np.unique(numbers)}
+    for path in ends.keys() - {path_of(number) for number in paged} - {"/subtrees/chunk_directory"}:
+        assert ends[path] == sums[numbers == of_list[path]].tolist(), f"{path}: another chunk's bytes"
+    if paged:
+        expected = [ends[path_of(number)][chunk] for number, chunk in paged_order(file)]
+        assert expected == file["/subtrees/checksums"][...].tolist(), "/subtrees/checksums: another chunk's bytes"
 
 
 def check_places(file):
     """The list of chunks leads to where HDF5 says that they are; it is ignored where its attributes are not true."""
     if not holds(file, "/subtrees/chunk_directory"):
         return
-    places, seen = file["/subtrees/chunk_directory"], {}
+    places, seen, arrays_of_file = file["/subtrees/chunk_directory"], {}, arrays(file)
     at = file["/levels/00/types"].id.get_chunk_info(0).byte_offset
     for place in places[...]:
         number, size = divmod(int(place), 1 << 32)
         path = path_of(number)
-        if path:
+        if path in arrays_of_file:
             chunk = file[path].id.get_chunk_info(seen.setdefault(path, 0))
             assert (chunk.byte_offset, chunk.size) == (at, size), f"{path}: chunk {seen[path]}"
             seen[path] += 1

@@ -12,6 +12,7 @@
 #include "core/alloc.h"
 #include "core/endian.h"
 #include "core/error.h"
+#include "format/checksum_pages.h"
 #include "format/chunk_directory.h"
 #include "format/file_in.h"
 #include "mesh/attributes.h"
@@ -28,7 +29,7 @@ _Static_assert(EBPO_A_TYPES == 0 && EBPO_A_PLANES == 2 && EBPO_A_LEAF_REFS == 9 
                    EBPO_A_GRAY_COLOURS == 15 && EBPO_A_FACE_SOURCE - EBPO_A_VERTICES == 4 &&
                    EBPO_A_BORDER_POINTS - EBPO_A_VERTICES == 6 &&
                    EBPO_A_SURFACE_COLOURS - EBPO_A_VERTICES == 11 &&
-                   EBPO_A_SUBTREE_SHARED - EBPO_A_SUBTREE_INDEX == 2,
+                   EBPO_A_CHECKSUM_INDEX - EBPO_A_SUBTREE_INDEX == 6,
                "the format fixes these array numbers: append new rows of array_table.inc");
 
 uint32_t ebpo_array_list_number(ebpo_array_id id, int level)
@@ -55,9 +56,9 @@ static ebpo_array_id find_array(uint32_t number, int *level)
         *level = (int)(number - ATTRIBUTE_NUMBERS);
         return EBPO_A_ATTRIBUTE;
     }
-    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_CHUNK_DIRECTORY; id++)
+    for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_A_ATTRIBUTE; id++)
         if (ebpo_array_list_number((ebpo_array_id)id, 0) == number)
-            return (ebpo_array_id)id;
+            return ebpo_schema_is_list((ebpo_array_id)id) ? EBPO_ARRAYS : (ebpo_array_id)id;
     return EBPO_ARRAYS;
 }
 
@@ -256,29 +257,40 @@ static ebpo_status find_rows(const ebpo_file *file, ebpo_array_in *a, const uint
         ++*row;
     return *row - a->first_checksum == chunks
                ? EBPO_OK
-               : long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS,
+               : long_chunk_fail(file, file->checksum_list,
                                  "the list has more or fewer chunks than", a->path, error);
 }
 
-/* Finds the rows of all arrays in the list of chunk checksums, which is sorted by array number. */
+/* Finds the rows of all arrays in the list of chunk checksums, which is sorted by array number. If
+ * the file has pages of checksums, the chunks of some arrays are there and not in the list. */
 static ebpo_status find_all(ebpo_file *file, const uint64_t *list, uint64_t rows, ebpo_error *error)
 {
+    const ebpo_array_in *pages = &file->root_array[EBPO_A_CHECKSUM_PAGES];
     ebpo_status status = EBPO_OK;
-    uint64_t row = 0;
+    uint64_t row = 0, in_pages = 0;
     for (uint64_t i = 1; i < rows; i++)
         if (ebpo_list_row_number(list[i]) < ebpo_list_row_number(list[i - 1]))
-            return long_chunk_fail(file, EBPO_A_CHUNK_CHECKSUMS, "the list is not in the order of",
+            return long_chunk_fail(file, file->checksum_list, "the list is not in the order of",
                                    "the arrays' numbers", error);
-    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)
-        if (ebpo_array_number(file, i)->present &&
-            !ebpo_schema_is_list(ebpo_array_number(file, i)->id))
-            status = find_rows(file, ebpo_array_number(file, i), list, rows, &row, error);
+    for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++) {
+        ebpo_array_in *a = ebpo_array_number(file, i);
+        if (!a->present || ebpo_schema_is_list(a->id))
+            continue;
+        if (pages->present && ebpo_is_paged(&file->info, a->id, a->level, &a->shape))
+            in_pages += ebpo_shape_chunks(&a->shape);
+        else
+            status = find_rows(file, a, list, rows, &row, error);
+    }
+    if (status == EBPO_OK && pages->present &&
+        (in_pages != pages->shape.rows || in_pages > UINT32_MAX))
+        return long_chunk_fail(file, EBPO_A_CHECKSUM_PAGES, "the array has more or fewer rows than",
+                               "the chunks of subtrees", error);
     return status;
 }
 
 static ebpo_status read_checksums(ebpo_file *file, ebpo_error *error)
 {
-    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
+    const ebpo_array_in *a = &file->root_array[file->checksum_list];
     uint64_t *list;
     ebpo_status status = ebpo_long_chunk_read(file, a, &list, error);
     if (status == EBPO_OK)
@@ -444,7 +456,7 @@ static ebpo_status list_chunks(ebpo_file *file, const uint64_t *rows, uint64_t c
         else
             status =
                 list_chunk(l, ebpo_list_row_number(rows[i]),
-                           (ebpo_chunk_location){ offset, ebpo_list_row_value(rows[i]) }, error);
+                           (ebpo_chunk_location){ offset, ebpo_list_row_value(rows[i]), 0 }, error);
         offset += ebpo_list_row_value(rows[i]);
     }
     for (int i = 0; i < ebpo_all_arrays(file) && status == EBPO_OK; i++)

@@ -90,7 +90,9 @@ EBPO_MUST_USE ebpo_status ebpo_stored_check_expansion(const ebpo_file *file, uin
 
 /* The list /chunk_checksums contains the last four bytes of every chunk of a file, which are its
  * checksum. The list is necessary because a chunk with a correct checksum may come from another
- * position or from another version of the file. Source: format-spec/checksums.md. */
+ * position or from another version of the file. Files with many subtrees have the list
+ * /subtrees/checksum_index instead, without the chunks that /subtrees/checksums has
+ * (checksum_pages.h). Source: format-spec/checksums.md. */
 
 /* Returns the list entry of a chunk: the last four bytes of the chunk. They are its checksum in
  * every pipeline (set of HDF5 filters) that has a checksum. `bytes`: stored size, at least four. */
@@ -102,13 +104,5 @@ static inline uint32_t ebpo_chunk_checksum(const uint8_t *stored, size_t bytes)
 /* Reads the list of chunk checksums if the file has the list; later calls do nothing. Must be
  * called before ebpo_chunk_fits. Any thread may call this function. */
 EBPO_MUST_USE ebpo_status ebpo_chunk_checksums_read(const ebpo_file *file, ebpo_error *error);
-
-/* Returns true if the bytes have the chunk's checksum in the list, or if the file has no list. */
-static inline bool ebpo_chunk_fits(const ebpo_file *file, const ebpo_array_in *array,
-                                   uint64_t chunk, const uint8_t *stored, size_t bytes)
-{
-    return !file->checksums || (bytes >= 4 && ebpo_chunk_checksum(stored, bytes) ==
-                                                  file->checksums[array->first_checksum + chunk]);
-}
 
 #endif

@@ -84,12 +84,18 @@ struct ebpo_file {
     ebpo_array_in level_array[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS];
     ebpo_array_in root_array[EBPO_ARRAYS]; /* used from EBPO_A_VERTICES on */
     ebpo_attributes_in attributes;
-    pthread_mutex_t lock;       /* held while chunks are located or checksums are read */
-    atomic_bool located;        /* the chunks of all arrays are located */
-    bool has_directory;         /* the file has a list of chunk offsets */
-    bool has_checksums;         /* the file has a list of chunk checksums: chunk_directory.h */
-    atomic_bool checksums_read; /* the list of chunk checksums has been read */
-    uint32_t *checksums;        /* the list, or NULL before it has been read */
+    pthread_mutex_t lock;        /* held while chunks are located or checksums are read */
+    atomic_bool located;         /* the chunks of all arrays are located */
+    bool has_directory;          /* the file has a list of chunk offsets */
+    bool has_checksums;          /* the file has a list of chunk checksums: chunk_directory.h */
+    atomic_bool checksums_read;  /* the list of chunk checksums has been read */
+    ebpo_array_id checksum_list; /* if has_checksums: the array that is this list */
+    uint32_t *checksums;         /* the list, or NULL before it has been read */
+    /* checksums that are read page by page (checksum_pages.h), if the list is
+     * EBPO_A_CHECKSUM_INDEX. A page is a chunk of /subtrees/checksums */
+    atomic_bool pages_ready; /* the members below and `checksum_row` of chunks are valid */
+    uint32_t *page_value;    /* [rows of /subtrees/checksums] values of the pages read so far */
+    atomic_uchar *page_read; /* [chunks of /subtrees/checksums] 1: the page has been read */
     ebpo_idle_readers idle;
 };
 

@@ -165,7 +165,8 @@ static ebpo_status check_pipelines(const ebpo_file *file, ebpo_error *error)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
             status = check_pipeline(file, &file->level_array[level][id], error);
     for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS && status == EBPO_OK; id++)
-        if (id != EBPO_A_CHUNK_CHECKSUMS || file->has_checksums)
+        if ((id != EBPO_A_CHUNK_CHECKSUMS && id != EBPO_A_CHECKSUM_INDEX) ||
+            (file->has_checksums && id == (int)file->checksum_list))
             status = check_pipeline(file, &file->root_array[id], error);
     for (int i = 0; i < file->attributes.arrays && status == EBPO_OK; i++)
         status = check_pipeline(file, &file->attributes.array[i], error);
@@ -206,14 +207,16 @@ static ebpo_status open_list(ebpo_file *file, ebpo_head *head, ebpo_array_id lis
     return EBPO_OK;
 }
 
-/* Opens the list of chunk checksums. Ignores the list if its chunks have no HDF5 filters, because
+/* Opens a list of chunk checksums. Ignores the list if its chunks have no HDF5 filters, because
  * then the last bytes of chunks are not checksums. Also ignores a list that does not state the
  * present size of the file, because another program has then rewritten the file. In this case, a
  * damaged list is not an error. */
-static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_array_id list,
+                                  ebpo_error *error)
 {
-    ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
-    ebpo_status status = open_list(file, head, EBPO_A_CHUNK_CHECKSUMS, &file->has_checksums, error);
+    ebpo_array_in *a = &file->root_array[list];
+    file->checksum_list = list;
+    ebpo_status status = open_list(file, head, list, &file->has_checksums, error);
     bool wrong = status == EBPO_E_FORMAT || status == EBPO_E_UNSUPPORTED;
     if (status == EBPO_OK && a->present && a->shape.pipeline == EBPO_PIPELINE_BARE)
         file->has_checksums = false;
@@ -221,6 +224,17 @@ static ebpo_status open_checksums(ebpo_file *file, ebpo_head *head, ebpo_error *
         return status;
     a->present = false;
     return EBPO_OK;
+}
+
+/* Opens the pages of checksums, which a file with the list of their checksums must have. */
+static ebpo_status open_pages(ebpo_file *file, ebpo_head *head, ebpo_error *error)
+{
+    ebpo_array_in *a = &file->root_array[EBPO_A_CHECKSUM_PAGES];
+    ebpo_check check = ebpo_reader_check(file, NULL);
+    ebpo_status status = open_array(file, head, EBPO_A_CHECKSUM_PAGES, 0, error);
+    return status != EBPO_OK || a->present
+               ? status
+               : ebpo_check_fail(&check, -1, a->path, "the array is missing", error);
 }
 
 static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *error)
@@ -232,7 +246,11 @@ static ebpo_status open_arrays(ebpo_file *file, ebpo_head *head, ebpo_error *err
     if (status == EBPO_OK && info->subtree_level)
         status = open_list(file, head, EBPO_A_CHUNK_DIRECTORY, &file->has_directory, error);
     if (status == EBPO_OK)
-        status = open_checksums(file, head, error);
+        status = open_checksums(file, head, EBPO_A_CHECKSUM_INDEX, error);
+    if (status == EBPO_OK && file->has_checksums)
+        status = open_pages(file, head, error);
+    else if (status == EBPO_OK)
+        status = open_checksums(file, head, EBPO_A_CHUNK_CHECKSUMS, error);
     if (status == EBPO_OK)
         status = check_group(head, "/mesh", info->parts & EBPO_PART_MESH, error);
     if (status == EBPO_OK)
@@ -369,6 +387,7 @@ static ebpo_status open_source(ebpo_file **out, const ebpo_source *source, const
     ebpo_idle_readers_make(&file->idle);
     atomic_init(&file->located, true);
     atomic_init(&file->checksums_read, false);
+    atomic_init(&file->pages_ready, false);
     ebpo_status status = ebpo_input_open(&file->in, source, name, error);
     if (status == EBPO_OK) {
         status = ebpo_head_open(&head, &file->in, error);
@@ -482,6 +501,8 @@ void ebpo_close(ebpo_file *file)
     for (int i = 0; i < EBPO_ARRAYS; i++)
         free(file->root_array[i].chunks);
     free(file->checksums);
+    free(file->page_value);
+    free(file->page_read);
     ebpo_attributes_close(file);
     ebpo_input_close(&file->in);
     ebpo_idle_readers_free(&file->idle);

@@ -9,9 +9,11 @@
 #include <string.h>
 
 #include "core/alloc.h"
+#include "core/endian.h"
 #include "core/workspace.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "format/checksum_pages.h"
 #include "format/chunk_directory.h"
 #include "format/file_in.h"
 #include "format/reader.h"
@@ -108,6 +110,43 @@ bool ebpo_hints_wanted(const ebpo_hints *e)
            (e->local && ebpo_input_can_advise(&e->file->in));
 }
 
+bool ebpo_has_paged_checksums(const ebpo_file *file, const ebpo_array_in *a)
+{
+    return file->has_checksums && file->checksum_list == EBPO_A_CHECKSUM_INDEX &&
+           ebpo_is_paged(&file->info, a->id, a->level, &a->shape);
+}
+
+/* Returns true if the checksum of a chunk is in a page that has not been read; *page is its number.
+ * The rows of chunks must be known (pages_ready). */
+static bool page_is_missing(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                            uint64_t *page)
+{
+    *page = array->chunks[chunk].checksum_row /
+            file->root_array[EBPO_A_CHECKSUM_PAGES].shape.chunk_rows;
+    return !atomic_load(&file->page_read[*page]);
+}
+
+/* Collects the pages with the checksums of chunks [begin, end). If the rows of chunks in the pages
+ * are not known yet, collects all pages and the array that gives the rows. */
+static void hint_checksums(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
+{
+    const ebpo_array_in *pages = &e->file->root_array[EBPO_A_CHECKSUM_PAGES];
+    uint64_t page, last = UINT64_MAX;
+    if (!ebpo_has_paged_checksums(e->file, array) || e->has_all_pages)
+        return;
+    if (!atomic_load(&e->file->pages_ready)) {
+        e->has_all_pages = true;
+        ebpo_hint_array(e, pages);
+        ebpo_hint_array(e, &e->file->root_array[EBPO_A_SUBTREE_INDEX]);
+        return;
+    }
+    for (uint64_t i = begin; i < end; i++)
+        if (page_is_missing(e->file, array, i, &page) && page != last) {
+            add_range(e, pages->chunks[page].address, pages->chunks[page].bytes);
+            last = page;
+        }
+}
+
 void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin, uint64_t end)
 {
     if (!ebpo_hints_wanted(e) || !array->present || e->failed)
@@ -119,6 +158,7 @@ void ebpo_hint_chunks(ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
         return;
     for (uint64_t i = begin; i < end; i++)
         add_range(e, array->chunks[i].address, array->chunks[i].bytes);
+    hint_checksums(e, array, begin, end);
 }
 
 void ebpo_hint_array(ebpo_hints *e, const ebpo_array_in *array)
@@ -201,7 +241,7 @@ static bool wants_checksums(const ebpo_file *file)
 /* Returns the range of the list of chunk checksums in the file. */
 static ebpo_range where_checksums(const ebpo_file *file)
 {
-    const ebpo_chunk_location *at = file->root_array[EBPO_A_CHUNK_CHECKSUMS].chunks;
+    const ebpo_chunk_location *at = file->root_array[file->checksum_list].chunks;
     return (ebpo_range){ at->address, at->bytes };
 }
 
@@ -225,6 +265,20 @@ static bool is_plausible_top(const ebpo_info *info)
     return info->top_bytes <= info->file_bytes / SHARE + ANYWAY;
 }
 
+/* Returns the range of the list of checksums, together with the pages of checksums if they are
+ * small. Writers store the pages before the list, so one request fetches both. */
+static ebpo_range where_small_checksums(const ebpo_file *file)
+{
+    enum { SMALL = 16 << 10, PAGE_OVERHEAD = 32 }; /* bytes; bytes of a page besides its values */
+    const ebpo_array_in *pages = &file->root_array[EBPO_A_CHECKSUM_PAGES];
+    ebpo_range range = where_checksums(file);
+    if (!pages->present || pages->shape.rows > SMALL / 4)
+        return range;
+    uint64_t bytes = 4 * pages->shape.rows + PAGE_OVERHEAD * ebpo_shape_chunks(&pages->shape);
+    bytes = bytes < range.offset ? bytes : 0;
+    return (ebpo_range){ range.offset - bytes, range.size + bytes };
+}
+
 void ebpo_hint_top(const ebpo_file *file)
 {
     const ebpo_info *info = &file->info;
@@ -240,7 +294,7 @@ void ebpo_hint_top(const ebpo_file *file)
     ebpo_range range[4] = { { directory->address, directory->bytes } };
     size_t count = 1;
     if (wants_checksums(file))
-        range[count++] = where_checksums(file);
+        range[count++] = where_small_checksums(file);
     from = file->in.source.prefetched;
     if (from < info->chunk_index_offset && info->chunk_index_offset <= top)
         range[count++] = (ebpo_range){ from, info->chunk_index_offset - from };
@@ -301,6 +355,117 @@ static ebpo_status fetch_stored(const ebpo_file *file, ebpo_chunk_reader *reader
     return ebpo_input_read(&ebpo_reader_own(file)->in, address, bytes, reader->stored, error);
 }
 
+/* --- pages of checksums --- */
+
+/* Numbers the chunks of all paged arrays, and allocates the values of pages. */
+static ebpo_status make_pages(ebpo_file *file, const uint64_t *index, ebpo_error *error)
+{
+    const ebpo_array_in *pages = &file->root_array[EBPO_A_CHECKSUM_PAGES];
+    int all = ebpo_all_arrays(file);
+    unsigned count = 0;
+    ebpo_paged_array *array = ebpo_alloc((uint64_t)all, sizeof *array);
+    uint32_t *value = ebpo_alloc(pages->shape.rows, sizeof *value);
+    atomic_uchar *read = ebpo_alloc_zero(ebpo_shape_chunks(&pages->shape), sizeof *read);
+    if (!array || !value || !read) {
+        free(array);
+        free(value);
+        free(read);
+        return ebpo_fail_memory(error, pages->shape.rows * sizeof *value);
+    }
+    for (int i = 0; i < all; i++) {
+        ebpo_array_in *a = ebpo_array_number(file, i);
+        if (a->present && ebpo_has_paged_checksums(file, a))
+            array[count++] = (ebpo_paged_array){ .id = a->id,
+                                                 .level = a->level,
+                                                 .shape = &a->shape,
+                                                 .row = &a->chunks[0].checksum_row,
+                                                 .step = sizeof *a->chunks };
+    }
+    ebpo_number_checksums(&file->info, index, array, count);
+    free(array);
+    file->page_value = value;
+    file->page_read = read;
+    return EBPO_OK;
+}
+
+ebpo_status ebpo_checksum_pages_prepare(const ebpo_file *file, ebpo_error *error)
+{
+    ebpo_file *own = ebpo_reader_own(file);
+    ebpo_read_options options = ebpo_read_threads(1);
+    uint64_t *index = NULL;
+    if (!file->has_checksums || file->checksum_list != EBPO_A_CHECKSUM_INDEX ||
+        atomic_load(&file->pages_ready))
+        return EBPO_OK;
+    /* before the lock, because reading the index also locks; two threads may read it */
+    ebpo_status status =
+        ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &options, sizeof *index, &index, error);
+    if (status != EBPO_OK)
+        return status;
+    pthread_mutex_lock(&own->lock);
+    if (!atomic_load(&own->pages_ready)) {
+        status = make_pages(own, index, error);
+        if (status == EBPO_OK)
+            atomic_store(&own->pages_ready, true);
+    }
+    pthread_mutex_unlock(&own->lock);
+    ebpo_array_free(options.workspace, index);
+    return status;
+}
+
+/* Reads a page. */
+static ebpo_status read_page(ebpo_file *file, uint64_t page, ebpo_error *error)
+{
+    const ebpo_array_in *pages = &file->root_array[EBPO_A_CHECKSUM_PAGES];
+    uint64_t first = page * pages->shape.chunk_rows, remaining = pages->shape.rows - first,
+             rows = remaining < pages->shape.chunk_rows ? remaining : pages->shape.chunk_rows;
+    ebpo_idle_reader *idle = ebpo_idle_readers_take(&file->idle);
+    if (!idle)
+        return ebpo_fail_memory(error, sizeof *idle);
+    ebpo_status status = ebpo_reader_chunk(file, pages, page, &idle->reader, idle->raw, error);
+    pthread_mutex_lock(&file->lock);
+    if (status == EBPO_OK && !atomic_load(&file->page_read[page])) {
+        for (uint64_t i = 0; i < rows; i++)
+            file->page_value[first + i] = ebpo_load32(idle->raw + 4 * i);
+        atomic_store(&file->page_read[page], 1);
+    }
+    pthread_mutex_unlock(&file->lock);
+    ebpo_idle_readers_give(&file->idle, idle);
+    return status;
+}
+
+/* Finds the expected checksum of a chunk of a paged array. */
+static ebpo_status find_in_page(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                                uint32_t *checksum, ebpo_error *error)
+{
+    uint64_t page;
+    ebpo_status status = ebpo_checksum_pages_prepare(file, error);
+    if (status == EBPO_OK && page_is_missing(file, array, chunk, &page))
+        status = read_page(ebpo_reader_own(file), page, error);
+    if (status == EBPO_OK)
+        *checksum = file->page_value[array->chunks[chunk].checksum_row];
+    return status;
+}
+
+/* Compares the checksum of a chunk, its last four bytes, with the expected checksum, which may be
+ * read from the file. *fits is true if the file states no checksums. */
+static ebpo_status chunk_fits(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
+                              const uint8_t *stored, size_t bytes, bool *fits, ebpo_error *error)
+{
+    uint32_t expected = 0;
+    ebpo_status status = EBPO_OK;
+    *fits = true;
+    if (!file->has_checksums || !file->checksums) /* no list, or not used yet (npm/module/view.c) */
+        return EBPO_OK;
+    if (ebpo_has_paged_checksums(file, array))
+        status = find_in_page(file, array, chunk, &expected, error);
+    else
+        expected = file->checksums[array->first_checksum + chunk];
+    *fits = status == EBPO_OK && bytes >= 4 && ebpo_chunk_checksum(stored, bytes) == expected;
+    return status;
+}
+
+/* --- chunks --- */
+
 static ebpo_status chunk_damaged(const ebpo_file *file, const ebpo_array_in *array, uint64_t chunk,
                                  const char *why, ebpo_error *error)
 {
@@ -317,11 +482,19 @@ static ebpo_status unpack_stored(const ebpo_file *file, const ebpo_array_in *arr
     ebpo_shape shape = ebpo_stored_shape(&array->shape, array->gates);
     size_t bytes = shape.chunk_rows * ebpo_shape_row_bytes(&shape);
     const char *why;
-    if (!ebpo_chunk_fits(file, array, chunk, stored, array->chunks[chunk].bytes))
-        return chunk_damaged(file, array, chunk, "its checksum is not the one in /chunk_checksums",
+    bool fits;
+    ebpo_status status =
+        chunk_fits(file, array, chunk, stored, array->chunks[chunk].bytes, &fits, error);
+    if (status != EBPO_OK)
+        return status;
+    if (!fits)
+        return chunk_damaged(file, array, chunk,
+                             file->checksum_list == EBPO_A_CHUNK_CHECKSUMS
+                                 ? "its checksum is not the one in /chunk_checksums"
+                                 : "its checksum is not the one that the file states",
                              error);
-    ebpo_status status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
-                                           array->chunks[chunk].bytes, raw, bytes, &why);
+    status = ebpo_chunk_decode(coder, shape.pipeline, shape.element_size, stored,
+                               array->chunks[chunk].bytes, raw, bytes, &why);
     if (status == EBPO_E_MEMORY)
         return ebpo_fail_memory(error, bytes);
     return status == EBPO_OK ? EBPO_OK : chunk_damaged(file, array, chunk, why, error);

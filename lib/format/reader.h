@@ -16,11 +16,12 @@ typedef struct ebpo_hints {
     uint64_t count, capacity;
     bool failed; /* true: chunk offsets could not be read, so nothing more is collected */
     bool local;  /* also collect chunks of local files: the operating system receives the hints */
-    bool counts_bytes; /* collect chunks of any file, for ebpo_hints_bytes */
+    bool counts_bytes;  /* collect chunks of any file, for ebpo_hints_bytes */
+    bool has_all_pages; /* all pages of checksums are collected */
 } ebpo_hints;
-#define EBPO_HINTS_INIT(file)                 \
-    {                                         \
-        file, NULL, 0, 0, false, false, false \
+#define EBPO_HINTS_INIT(file)                        \
+    {                                                \
+        file, NULL, 0, 0, false, false, false, false \
     }
 /* Collects chunks [begin, end) of an array; does nothing if the array is absent. */
 void ebpo_hint_chunks(ebpo_hints *hints, const ebpo_array_in *array, uint64_t begin, uint64_t end);
@@ -46,6 +47,13 @@ void ebpo_hint_all(ebpo_hints *hints);
 /* Returns the number of bytes of the file in the collected chunks, each byte counted once. Clears
  * the collection and sends no hints. */
 uint64_t ebpo_hints_bytes(ebpo_hints *hints);
+
+/* Returns true if the checksums of an array's chunks are in pages of the file. */
+bool ebpo_has_paged_checksums(const ebpo_file *file, const ebpo_array_in *array);
+
+/* Finds the rows of all chunks in the pages. Reads /subtrees/index. Does nothing if the file has no
+ * pages, and in later calls. Any thread may call this function. */
+EBPO_MUST_USE ebpo_status ebpo_checksum_pages_prepare(const ebpo_file *file, ebpo_error *error);
 
 /* Returns options for reading into memory with this number of threads. */
 static inline ebpo_read_options ebpo_read_threads(unsigned threads)

@@ -67,10 +67,10 @@ const ebpo_array_spec ebpo_schema[EBPO_ARRAYS] = {
                       .bytes = offsetof(ebpo_stored_sizes, subtree_bytes),   \
                       .coding = "plain",                                     \
                       .about = about_ },
-#define SUM_ARRAY(ID, path, stored, per_, about_)                           \
+#define SUM_ARRAY(ID, path, stored, per_, needs_, about_)                   \
     [EBPO_A_##ID] = { .name = path,                                         \
                       .per = EBPO_PER_##per_,                               \
-                      .needs = EBPO_NEEDS_ALWAYS,                           \
+                      .needs = EBPO_NEEDS_##needs_,                         \
                       .sizes = stored,                                      \
                       .since = 1,                                           \
                       .if_needed = true,                                    \

@@ -81,6 +81,7 @@ enum {
     EBPO_FACE_BLOCK = 2048,     /* /mesh/faces */
     EBPO_VERTEX_BLOCK = 1024,   /* /mesh/vertices */
     EBPO_SUBTREE_ROWS = 128,    /* /subtrees/counts */
+    EBPO_CHECKSUM_ROWS = 256,   /* /subtrees/checksums */
     EBPO_COLS_OF_SUBTREES = 255 /* see ebpo_schema_cols */
 };
 
@@ -208,11 +209,12 @@ static inline bool ebpo_schema_is_index(int id)
            ebpo_schema[id].per <= EBPO_PER_LEAF_BLOCK;
 }
 
-/* Returns true for the two lists of all chunks (offsets and checksums). Each list is a single
- * chunk. The chunks of the two lists are not in the lists. */
+/* Returns true for the lists of chunks (offsets and checksums). Each list is a single chunk, which
+ * is in no list of checksums. */
 static inline bool ebpo_schema_is_list(ebpo_array_id id)
 {
-    return id == EBPO_A_CHUNK_DIRECTORY || id == EBPO_A_CHUNK_CHECKSUMS;
+    return id == EBPO_A_CHUNK_DIRECTORY || id == EBPO_A_CHUNK_CHECKSUMS ||
+           id == EBPO_A_CHECKSUM_INDEX;
 }
 
 /* Returns true if ebpo_level has a member for the array. */

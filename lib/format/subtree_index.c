@@ -110,7 +110,10 @@ static ebpo_status open_counts(ebpo_chunks *chunks, uint64_t subtree, subtree_co
     uint64_t rows = array->shape.chunk_rows, chunk = subtree / rows, sums[EBPO_SUBTREE_COLS];
     c->view = (ebpo_held_chunk){ .array = array };
     c->cols = array->shape.cols;
-    ebpo_status status = sums_before(chunks, chunk, c->cols, c->begin, error);
+    /* the pages of checksums depend on the same sums */
+    ebpo_status status = ebpo_checksum_pages_prepare(chunks->file, error);
+    if (status == EBPO_OK)
+        status = sums_before(chunks, chunk, c->cols, c->begin, error);
     if (status == EBPO_OK)
         status = sums_before(chunks, chunk + 1, c->cols, c->end, error);
     if (status == EBPO_OK)

@@ -21,6 +21,7 @@
 #include "core/fp_env.h"
 #include "core/parallel.h"
 #include "core/checksum.h"
+#include "format/checksum_pages.h"
 #include "format/chunk_layout.h"
 #include "format/chunk_directory.h"
 #include "format/content_checksum.h"
@@ -35,7 +36,9 @@
 
 /* The lists that have a row for each chunk. */
 typedef enum chunk_list {
-    CHUNK_CHECKSUMS, /* /chunk_checksums: chunk checksums, in the order of arrays */
+    /* /chunk_checksums: chunk checksums, in the order of arrays. If the file has pages of
+     * checksums: /subtrees/checksum_index, only of chunks that are not in the pages */
+    CHUNK_CHECKSUMS,
     /* /subtrees/chunk_directory: stored sizes in file order, whose running sums are offsets */
     CHUNK_SIZES,
     CHUNK_LIST_COUNT
@@ -48,6 +51,7 @@ typedef struct file_headers {
     ebpo_h5_out out;
     ebpo_h5_id root;
     ebpo_array_out list[CHUNK_LIST_COUNT]; /* a list without rows is not written */
+    ebpo_array_out pages;                  /* /subtrees/checksums; not written without rows */
     uint64_t chunks;                       /* number of chunks of the plan's arrays */
     int codec_level;
     uint64_t head_bytes;  /* size of the headers */
@@ -75,16 +79,30 @@ static bool has_index(const ebpo_plan *plan)
 }
 
 /* Describes the array of a list with `rows` rows; 0: the list is not written. */
-static void plan_list(file_headers *h, chunk_list list, ebpo_array_id id, uint64_t rows)
+static void plan_list(const file_headers *h, ebpo_array_out *a, ebpo_array_id id, uint64_t rows,
+                      uint64_t chunk_rows)
 {
-    ebpo_array_out *a = &h->list[list];
     *a = (ebpo_array_out){ .id = id, .handle = -1 };
     ebpo_schema_path(id, 0, a->path);
     if (rows)
         a->shape = (ebpo_shape){ .rows = rows,
-                                 .chunk_rows = (uint32_t)rows,
+                                 .chunk_rows = (uint32_t)(rows < chunk_rows ? rows : chunk_rows),
                                  .element_size = ebpo_schema[id].sizes,
                                  .pipeline = h->plan->array[0].shape.pipeline };
+}
+
+/* Returns true if the checksums of an array's chunks are in pages. A file with a single block of
+ * subtrees (checksum_pages.c) has no pages, because every query would need all of them. */
+static bool is_paged(const ebpo_plan *plan, const ebpo_array_out *a)
+{
+    return plan->info.subtree_level && ebpo_schema_rows(&plan->info, EBPO_A_SUBTREE_INDEX, 0) > 1 &&
+           ebpo_is_paged(&plan->info, a->id, a->level, &a->shape);
+}
+
+/* Returns the number of chunks of an array that is written, or 0. */
+static uint64_t chunks_of(const ebpo_array_out *a)
+{
+    return a->shape.rows ? ebpo_shape_chunks(&a->shape) : 0;
 }
 
 /* Initialises the headers, which refer to the plan; the caller frees the plan after headers_close.
@@ -97,10 +115,16 @@ static void headers_plan(file_headers *h, ebpo_plan *plan, uint64_t chunks,
         .plan = plan, .root = -1, .chunks = chunks, .codec_level = options->codec_level
     };
     h->out = (ebpo_h5_out)EBPO_H5_OUT_INIT;
-    plan_list(h, CHUNK_CHECKSUMS, EBPO_A_CHUNK_CHECKSUMS, has_checksums ? chunks : 0);
+    uint64_t paged = 0, all = UINT32_MAX; /* all: a list has a single chunk */
+    for (unsigned i = 0; i < plan->count && has_checksums; i++)
+        paged += is_paged(plan, &plan->array[i]) ? ebpo_shape_chunks(&plan->array[i].shape) : 0;
+    plan_list(h, &h->pages, EBPO_A_CHECKSUM_PAGES, paged, EBPO_CHECKSUM_ROWS);
+    chunks += chunks_of(&h->pages);
+    plan_list(h, &h->list[CHUNK_CHECKSUMS], paged ? EBPO_A_CHECKSUM_INDEX : EBPO_A_CHUNK_CHECKSUMS,
+              has_checksums ? chunks - paged : 0, all);
     /* other rows of the list of sizes: HDF5's chunk indexes, the list of checksums */
-    plan_list(h, CHUNK_SIZES, EBPO_A_CHUNK_DIRECTORY,
-              plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0);
+    plan_list(h, &h->list[CHUNK_SIZES], EBPO_A_CHUNK_DIRECTORY,
+              plan->info.subtree_level ? chunks + has_index(plan) + has_checksums : 0, all);
 }
 
 static ebpo_status make_level_groups(file_headers *h, ebpo_error *error)
@@ -142,7 +166,9 @@ static ebpo_status make_root_group(file_headers *h, const char *path, uint32_t n
     if (!(ebpo_schema_has(&h->plan->info) & need))
         return EBPO_OK;
     for (int k = EBPO_LEVEL_ARRAYS; k < EBPO_ARRAYS; k++)
-        links += (ebpo_schema[k].needs & need) != 0;
+        links +=
+            (ebpo_schema[k].needs & need) != 0 &&
+            (h->pages.shape.rows || (k != EBPO_A_CHECKSUM_PAGES && k != EBPO_A_CHECKSUM_INDEX));
     ebpo_status status = ebpo_h5_make_group(&h->out, path, links, &id, error);
     if (status == EBPO_OK)
         status = ebpo_h5_put_text(&h->out, id, "about", about, error);
@@ -197,7 +223,7 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
     /* links of the root group: /levels, /mesh, /maps, and optional groups and arrays */
     ebpo_status status =
         ebpo_h5_create(&h->out, path, shown, head_bytes,
-                       3 + (h->list[CHUNK_CHECKSUMS].shape.rows != 0) +
+                       3 + (h->list[CHUNK_CHECKSUMS].shape.rows && !h->pages.shape.rows) +
                            (plan->info.subtree_level != 0) + (plan->attributes != NULL) +
                            (plan->info.parts & EBPO_PART_BORDER ? 1 : 0) +
                            (plan->info.parts & EBPO_PART_SURFACE ? 1 : 0),
@@ -227,6 +253,8 @@ static ebpo_status write_headers(file_headers *h, const char *path, const char *
         status = ebpo_attributes_put_group(&h->out, plan, error);
     for (unsigned i = 0; i < plan->count && status == EBPO_OK; i++)
         status = make_array(h, &plan->array[i], i == 0 ? &first : NULL, error);
+    if (status == EBPO_OK && h->pages.shape.rows)
+        status = make_array(h, &h->pages, NULL, error);
     for (chunk_list l = 0; l < CHUNK_LIST_COUNT && status == EBPO_OK; l++) {
         if (h->list[l].shape.rows == 0)
             continue;
@@ -244,6 +272,8 @@ static void headers_close(file_headers *h)
         ebpo_h5_close_id(&h->out, h->plan->array[i].handle);
         h->plan->array[i].handle = -1;
     }
+    ebpo_h5_close_id(&h->out, h->pages.handle);
+    h->pages.handle = -1;
     for (chunk_list l = 0; l < CHUNK_LIST_COUNT; l++) {
         ebpo_h5_close_id(&h->out, h->list[l].handle);
         h->list[l].handle = -1;
@@ -267,7 +297,8 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
     ebpo_plan *plan = h->plan;
     /* capacity: more than headers and indexes take; headers, all: measured bytes without and with
      * the indexes */
-    uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count + 32 * h->chunks,
+    uint64_t capacity = (256 << 10) + (4 << 10) * (uint64_t)plan->count +
+                        32 * (h->chunks + chunks_of(&h->pages)),
              headers = 0, all = 0;
     ebpo_status status = write_headers(h, NULL, shown, capacity, (first_chunk){ "", 1 }, error);
     if (status == EBPO_OK)
@@ -277,6 +308,9 @@ static ebpo_status headers_measure(file_headers *h, const char *shown, ebpo_erro
         for (uint64_t k = i == 0; k < ebpo_shape_chunks(&a->shape) && status == EBPO_OK; k++)
             status = ebpo_h5_put_chunk(&h->out, a->path, a->handle, &a->shape, k, "", 1, error);
     }
+    for (uint64_t k = 0; k < chunks_of(&h->pages) && status == EBPO_OK; k++)
+        status = ebpo_h5_put_chunk(&h->out, h->pages.path, h->pages.handle, &h->pages.shape, k, "",
+                                   1, error);
     headers_close(h);
     if (status == EBPO_OK)
         status = ebpo_h5_head_used(&h->out, capacity, &all, error);
@@ -303,6 +337,8 @@ static ebpo_status headers_begin_index(file_headers *h, ebpo_error *error)
     for (unsigned i = 0; i < h->plan->count && status == EBPO_OK; i++)
         status =
             ebpo_h5_open_array(&h->out, h->plan->array[i].path, &h->plan->array[i].handle, error);
+    if (status == EBPO_OK && h->pages.shape.rows)
+        status = ebpo_h5_open_array(&h->out, h->pages.path, &h->pages.handle, error);
     for (chunk_list l = 0; l < CHUNK_LIST_COUNT && status == EBPO_OK; l++)
         if (h->list[l].shape.rows)
             status = ebpo_h5_open_array(&h->out, h->list[l].path, &h->list[l].handle, error);
@@ -338,8 +374,13 @@ typedef struct writer {
     uint64_t chunk_bytes, chunks_done; /* stored bytes and number of the chunks so far */
     /* [chunks] rows of the list of chunk checksums, if the list is written */
     uint64_t *checksum_row;
-    /* [arrays of the plan] index of the array's first row in checksum_row */
+    /* [arrays of the plan] index of the array's first row in checksum_row; not used for arrays with
+     * a page_row */
     uint64_t *first_checksum;
+    uint64_t pages_checksum; /* the same for the pages of checksums */
+    /* [arrays of the plan][chunks] rows of the chunks in page_value; NULL: not in pages */
+    uint32_t **page_row;
+    uint32_t *page_value; /* [rows of /subtrees/checksums] */
     /* [size_rows] rows so far of the list of chunk sizes, if the list is written */
     uint64_t *size_row;
     uint64_t size_rows;
@@ -465,9 +506,12 @@ static void list_chunk(writer *w, const window_chunk *s)
     }
     uint32_t number = ebpo_array_list_number(s->array->id, s->array->level);
     add_size_row(w, number, s->stored_bytes);
-    if (w->head.list[CHUNK_CHECKSUMS].shape.rows)
-        w->checksum_row[w->first_checksum[s->array - w->plan.array] + s->chunk] =
-            ebpo_list_row(number, ebpo_chunk_checksum(s->stored, s->stored_bytes));
+    uint32_t checksum = ebpo_chunk_checksum(s->stored, s->stored_bytes);
+    size_t array = (size_t)(s->array - w->plan.array);
+    if (w->page_row[array])
+        w->page_value[w->page_row[array][s->chunk]] = checksum;
+    else if (w->head.list[CHUNK_CHECKSUMS].shape.rows)
+        w->checksum_row[w->first_checksum[array] + s->chunk] = ebpo_list_row(number, checksum);
     w->chunk_bytes += s->stored_bytes;
     if (w->chunks_done + 1 == w->order.top)
         w->top_bytes =
@@ -506,6 +550,35 @@ static ebpo_status write_chunks(writer *w, ebpo_error *error)
     return status == EBPO_OK && w->used ? flush_window(w, error) : status;
 }
 
+/* Writes the pages of checksums. */
+static ebpo_status write_pages(writer *w, ebpo_error *error)
+{
+    const ebpo_array_out *a = &w->head.pages;
+    const ebpo_shape *shape = &a->shape;
+    window_chunk *s = &w->window[0]; /* for its buffers */
+    uint32_t number = ebpo_array_list_number(EBPO_A_CHECKSUM_PAGES, 0);
+    ebpo_status status = EBPO_OK;
+    for (uint64_t k = 0; k < chunks_of(a) && status == EBPO_OK; k++) {
+        memset(s->raw, 0, 4 * (size_t)shape->chunk_rows);
+        for (uint64_t i = k * shape->chunk_rows, n = 0; n < shape->chunk_rows && i < shape->rows;
+             i++, n++)
+            ebpo_store32(s->raw + 4 * n, w->page_value[i]);
+        status = ebpo_chunk_encode(&w->coders[0], shape->pipeline, w->options->codec_level,
+                                   shape->element_size, s->raw, 4 * (size_t)shape->chunk_rows,
+                                   s->stored, &s->stored_bytes);
+        if (status != EBPO_OK)
+            return ebpo_fail_at(error, status, w->head.out.shown, a->path, -1,
+                                "a chunk could not be compressed");
+        status = ebpo_h5_put_chunk(&w->head.out, a->path, a->handle, shape, k, s->stored,
+                                   s->stored_bytes, error);
+        add_size_row(w, number, s->stored_bytes);
+        w->checksum_row[w->pages_checksum + k] =
+            ebpo_list_row(number, ebpo_chunk_checksum(s->stored, s->stored_bytes));
+        w->chunk_bytes += s->stored_bytes;
+    }
+    return status;
+}
+
 /* Writes a list as one chunk. *bytes: stored size; 0 for a list without rows. */
 static ebpo_status write_list(writer *w, chunk_list list, const uint64_t *values, size_t *bytes,
                               ebpo_error *error)
@@ -535,7 +608,8 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
     ebpo_status status =
         write_list(w, CHUNK_CHECKSUMS, values[CHUNK_CHECKSUMS], &bytes[CHUNK_CHECKSUMS], error);
     if (status == EBPO_OK && bytes[CHUNK_CHECKSUMS])
-        add_size_row(w, ebpo_array_list_number(EBPO_A_CHUNK_CHECKSUMS, 0), bytes[CHUNK_CHECKSUMS]);
+        add_size_row(w, ebpo_array_list_number(w->head.list[CHUNK_CHECKSUMS].id, 0),
+                     bytes[CHUNK_CHECKSUMS]);
     if (status == EBPO_OK)
         status = write_list(w, CHUNK_SIZES, values[CHUNK_SIZES], &bytes[CHUNK_SIZES], error);
     if (status == EBPO_OK)
@@ -547,6 +621,44 @@ static ebpo_status write_lists(writer *w, ebpo_error *error)
         offset += bytes[l];
     }
     return status;
+}
+
+/* Computes the rows of all chunks in the lists of checksums. */
+static ebpo_status number_chunks(writer *w, ebpo_error *error)
+{
+    uint64_t sum = 0;
+    unsigned count = 0;
+    bool has_pages = w->head.pages.shape.rows != 0, passed = false;
+    ebpo_paged_array *paged = ebpo_alloc(w->plan.count, sizeof *paged);
+    ebpo_status status = paged ? EBPO_OK : EBPO_E_MEMORY;
+    for (unsigned i = 0; i < w->plan.count && status == EBPO_OK; i++) {
+        const ebpo_array_out *a = &w->plan.array[i];
+        if (!passed && a->id == EBPO_A_ATTRIBUTE) {
+            w->pages_checksum = sum; /* the numbers of attributes are greater */
+            sum += chunks_of(&w->head.pages);
+            passed = true;
+        }
+        w->first_checksum[i] = sum;
+        if (!has_pages || !is_paged(&w->plan, a)) {
+            sum += ebpo_shape_chunks(&a->shape);
+            continue;
+        }
+        w->page_row[i] = ebpo_alloc(ebpo_shape_chunks(&a->shape), sizeof **w->page_row);
+        if (!w->page_row[i])
+            status = EBPO_E_MEMORY;
+        paged[count++] = (ebpo_paged_array){ .id = a->id,
+                                             .level = a->level,
+                                             .shape = &a->shape,
+                                             .row = w->page_row[i],
+                                             .step = sizeof **w->page_row };
+    }
+    if (!passed)
+        w->pages_checksum = sum;
+    if (status == EBPO_OK && count)
+        ebpo_number_checksums(&w->plan.info, w->plan.subtrees.index, paged, count);
+    free(paged);
+    return status == EBPO_OK ? EBPO_OK
+                             : ebpo_fail_memory(error, w->order.count * sizeof **w->page_row);
 }
 
 /* Allocates the buffers of the window and the rows of the lists. */
@@ -563,19 +675,16 @@ static ebpo_status make_window(writer *w, ebpo_error *error)
     w->size_row = ebpo_alloc(w->head.list[CHUNK_SIZES].shape.rows, sizeof *w->size_row);
     w->checksum_row = ebpo_alloc(w->head.list[CHUNK_CHECKSUMS].shape.rows, sizeof *w->checksum_row);
     w->first_checksum = ebpo_alloc(w->plan.count, sizeof *w->first_checksum);
+    w->page_value = ebpo_alloc(w->head.pages.shape.rows, sizeof *w->page_value);
+    w->page_row = ebpo_alloc_zero(w->plan.count, sizeof *w->page_row);
     if (!w->coders || !buffers || !w->digest || !w->size_row || !w->checksum_row ||
-        !w->first_checksum)
+        !w->first_checksum || !w->page_value || !w->page_row)
         return ebpo_fail_memory(error, chunk_count * buffer_bytes);
     for (unsigned i = 0; i < chunk_count; i++) {
         w->window[i].raw = buffers + i * buffer_bytes;
         w->window[i].stored = w->window[i].raw + EBPO_CHUNK_BYTES_MAX;
     }
-    uint64_t sum = 0;
-    for (unsigned i = 0; i < w->plan.count; i++) {
-        w->first_checksum[i] = sum;
-        sum += ebpo_shape_chunks(&w->plan.array[i].shape);
-    }
-    return EBPO_OK;
+    return number_chunks(w, error);
 }
 
 /* Encodes the file's first chunk, which is written with the headers. */
@@ -632,6 +741,8 @@ static ebpo_status write_file(writer *w, const char *path, const char *shown, eb
         status = headers_begin_index(&w->head, error);
     if (status == EBPO_OK)
         status = write_chunks(w, error);
+    if (status == EBPO_OK)
+        status = write_pages(w, error);
     if (status == EBPO_OK)
         status = write_lists(w, error);
     if (status == EBPO_OK)
@@ -702,6 +813,10 @@ static ebpo_status write_tree(const ebpo_tree *tree, const char *path, const cha
     free(w->size_row);
     free(w->checksum_row);
     free(w->first_checksum);
+    for (unsigned i = 0; w->page_row && i < w->plan.count; i++)
+        free(w->page_row[i]);
+    free(w->page_row);
+    free(w->page_value);
     ebpo_chunk_order_free(&w->order);
     ebpo_plan_free(&w->plan);
     for (int i = 0; i < EBPO_DIGESTS; i++)

@@ -97,6 +97,7 @@ typedef struct ebpo_shape {
 typedef struct ebpo_chunk_location {
     uint64_t address;
     uint32_t bytes;
+    uint32_t checksum_row; /* for format/checksum_pages.h: row of /subtrees/checksums, or 0 */
 } ebpo_chunk_location;
 
 /* Returns the number of rows in a full chunk. This is the largest power of two with which a chunk

@@ -120,7 +120,7 @@ static const char *store_offset(ebpo_head_chunks *t, uint64_t i, uint64_t addres
         return "the chunk is larger than its filters allow";
     if (address > t->end || bytes > t->end - address)
         return "the chunk is beyond the end of the file";
-    t->locations[i] = (ebpo_chunk_location){ address, (uint32_t)bytes };
+    t->locations[i] = (ebpo_chunk_location){ address, (uint32_t)bytes, 0 };
     t->stored += bytes;
     t->at = UINT64_MAX;
     return t->stored > t->end ? "the array's chunks have more bytes than the file" : NULL;

@@ -7,7 +7,8 @@
  * - Unused bytes of the file are counted. They do not affect results, but a change of these bytes
  *   must be detectable.
  * - Chunk checksums are compared with the last bytes of the chunks. These bytes are read without
- *   the library's check of checksums. */
+ *   the library's check of checksums. The order of /subtrees/checksums is computed from the numbers
+ *   of the specification. */
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,6 +17,7 @@
 #include "core/endian.h"
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/workspace.h"
 #include "format/chunk_directory.h"
 #include "format/reader.h"
 #include "hdf5_read/chunk.h"
@@ -303,7 +305,7 @@ static ebpo_status index_all(offset_comparison *c, ebpo_error *error)
                   { EBPO_A_SURFACE_TRIANGLES, 4104 }, { EBPO_A_SURFACE_POINTS, 4105 },
                   { EBPO_A_SURFACE_NORMALS, 4106 },   { EBPO_A_SURFACE_COLOURS, 4107 },
                   { EBPO_A_SUBTREE_INDEX, 4112 },     { EBPO_A_SUBTREE_COUNTS, 4113 },
-                  { EBPO_A_SUBTREE_SHARED, 4114 } };
+                  { EBPO_A_SUBTREE_SHARED, 4114 },    { EBPO_A_CHECKSUM_PAGES, 4117 } };
     ebpo_status status = EBPO_OK;
     for (int level = 0; level < c->file->info.level_count && status == EBPO_OK; level++)
         for (int id = 0; id < EBPO_LEVEL_ARRAYS && status == EBPO_OK; id++)
@@ -560,10 +562,16 @@ enum {
 typedef struct checksum_comparison {
     ebpo_tally *tally;
     const ebpo_file *file;
-    /* [rows] /chunk_checksums: the array's number in the upper 32 bits, the checksum in the lower
-     * 32 bits */
+    const char *path; /* of the list */
+    /* [rows] the list: the array's number in the upper 32 bits, the checksum in the lower 32 bits
+     */
     const uint64_t *list;
     uint64_t rows;
+    /* if the list is /subtrees/checksum_index: the values of /subtrees/checksums (else NULL), and
+     * of /subtrees/index, which has `blocks` rows of `cols` columns */
+    const uint32_t *page;
+    const uint64_t *index;
+    uint64_t page_rows, blocks, cols;
 } checksum_comparison;
 
 /* Returns an array's number in the specification, or UNKNOWN. */
@@ -585,13 +593,15 @@ static uint32_t number_of(const ebpo_array_in *a)
     case EBPO_A_SUBTREE_INDEX: return 4112;
     case EBPO_A_SUBTREE_COUNTS: return 4113;
     case EBPO_A_SUBTREE_SHARED: return 4114;
+    case EBPO_A_CHECKSUM_PAGES: return 4117;
     case EBPO_A_ATTRIBUTE: return 8191 + (uint32_t)a->level;
     default: return a->id < EBPO_LEVEL_ARRAYS ? 64 * (uint32_t)a->level + (uint32_t)a->id : UNKNOWN;
     }
 }
 
+/* Compares the last bytes of a chunk with the value in a row of the list or array `path`. */
 static ebpo_status compare_sum(checksum_comparison *c, const ebpo_array_in *a, uint64_t chunk,
-                               uint64_t row, ebpo_error *error)
+                               const char *path, uint64_t row, uint32_t value, ebpo_error *error)
 {
     ebpo_tally *tally = c->tally;
     ebpo_chunk_location at = a->chunks[chunk];
@@ -602,10 +612,79 @@ static ebpo_status compare_sum(checksum_comparison *c, const ebpo_array_in *a, u
     ebpo_status status = ebpo_input_read(&ebpo_reader_own(c->file)->in,
                                          at.address + at.bytes - SUM_BYTES, SUM_BYTES, end, error);
     if (status == EBPO_OK)
-        CHECK(ebpo_load32(end) == (uint32_t)c->list[row],
-              "%s, chunk %" PRIu64 ": /chunk_checksums, row %" PRIu64 ", contains %08" PRIx32
+        CHECK(ebpo_load32(end) == value,
+              "%s, chunk %" PRIu64 ": %s, row %" PRIu64 ", contains %08" PRIx32
               ", but the chunk ends with %08" PRIx32,
-              a->path, chunk, row, (uint32_t)c->list[row], ebpo_load32(end));
+              a->path, chunk, path, row, value, ebpo_load32(end));
+    return status;
+}
+
+/* Returns true if /subtrees/checksums has the chunks of an array. Three arrays of a level, with the
+ * numbers 10 to 12, are indexes. */
+static bool is_in_pages(const checksum_comparison *c, const ebpo_array_in *a)
+{
+    uint32_t number = number_of(a), of_level = number % 64;
+    return c->page && a->present && ebpo_shape_chunks(&a->shape) > c->blocks &&
+           (number == 4096 || number == 4097 || number == 4099 || number == 4100 ||
+            (number < 4096 && (int)(number / 64) > c->file->info.subtree_level &&
+             (of_level < 10 || of_level > 12)));
+}
+
+/* Returns the number of rows of an array before a block of subtrees (format-spec/checksums.md,
+ * section 4). */
+static uint64_t rows_before(const checksum_comparison *c, const ebpo_array_in *a, uint64_t block)
+{
+    /* column of each array of a level in the row of the level */
+    static const uint8_t column[] = { 0, 0, 3, 1, 2, 0, 1, 1, 1, 5, 0, 0, 0, 1, 4, 0 };
+    enum { TYPES = 0, WHITE = 5 };
+    const uint64_t *row = c->index + block * c->cols;
+    uint32_t number = number_of(a),
+             before = number / 64 - (uint32_t)c->file->info.subtree_level - 1;
+    if (number >= 4096)
+        return number == 4096 || number == 4099 ? row[2] + row[3] : row[0] + row[1];
+    const uint64_t *level = row + 6 + 7 * before;
+    uint64_t groups =
+        before ? level[-7] : block * c->file->root_array[EBPO_A_SUBTREE_COUNTS].shape.chunk_rows;
+    return number % 64 == TYPES   ? groups
+           : number % 64 == WHITE ? 8 * groups - level[0] - level[1] - level[2]
+                                  : level[column[number % 64]];
+}
+
+/* Compares the next chunks of an array with the next rows of the pages, up to the rows of the block
+ * after `block`. *done: number of chunks before. */
+static ebpo_status compare_block(checksum_comparison *c, const ebpo_array_in *a, uint64_t block,
+                                 uint64_t *done, uint64_t *row, ebpo_error *error)
+{
+    uint64_t end = block + 1 < c->blocks ? rows_before(c, a, block + 1) : UINT64_MAX;
+    ebpo_status status = EBPO_OK;
+    for (; *done < ebpo_shape_chunks(&a->shape) && *done * a->shape.chunk_rows < end &&
+           *row < c->page_rows && status == EBPO_OK;
+         ++*done, ++*row)
+        status = compare_sum(c, a, *done, "/subtrees/checksums", *row, c->page[*row], error);
+    return status;
+}
+
+/* Compares the chunks of subtrees with the pages. */
+static ebpo_status compare_pages(checksum_comparison *c, ebpo_error *error)
+{
+    const ebpo_file *file = c->file;
+    ebpo_tally *tally = c->tally;
+    uint64_t row = 0, done[INDEXED_MAX] = { 0 };
+    ebpo_status status = EBPO_OK;
+    for (uint64_t block = 0; c->page && block < c->blocks; block++) {
+        unsigned n = 0;
+        for (int level = 0; level < file->info.level_count; level++)
+            for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++, n++)
+                if (status == EBPO_OK && is_in_pages(c, &file->level_array[level][id]))
+                    status = compare_block(c, &file->level_array[level][id], block, &done[n], &row,
+                                           error);
+        for (int id = EBPO_LEVEL_ARRAYS; id < EBPO_ARRAYS; id++, n++)
+            if (status == EBPO_OK && is_in_pages(c, &file->root_array[id]))
+                status = compare_block(c, &file->root_array[id], block, &done[n], &row, error);
+    }
+    CHECK(!c->page || status != EBPO_OK || row == c->page_rows,
+          "/subtrees/checksums has %" PRIu64 " rows, but the subtrees have %" PRIu64 " chunks",
+          c->page_rows, row);
     return status;
 }
 
@@ -614,13 +693,13 @@ static ebpo_status compare_array(checksum_comparison *c, const ebpo_array_in *a,
     ebpo_tally *tally = c->tally;
     ebpo_status status = EBPO_OK;
     uint32_t number = number_of(a);
-    if (!a->present || number == UNKNOWN)
+    if (!a->present || number == UNKNOWN || is_in_pages(c, a))
         return EBPO_OK;
     uint64_t found = 0, chunks = ebpo_shape_chunks(&a->shape);
     for (uint64_t row = 0; row < c->rows && status == EBPO_OK; row++)
         if ((uint32_t)(c->list[row] >> 32) == number && found++ < chunks)
-            status = compare_sum(c, a, found - 1, row, error);
-    CHECK(found == chunks, "/chunk_checksums has %" PRIu64 " rows of the %" PRIu64 " chunks of %s",
+            status = compare_sum(c, a, found - 1, c->path, row, (uint32_t)c->list[row], error);
+    CHECK(found == chunks, "%s has %" PRIu64 " rows of the %" PRIu64 " chunks of %s", c->path,
           found, chunks, a->path);
     return status;
 }
@@ -641,9 +720,12 @@ static ebpo_status compare_checksums(checksum_comparison *c, ebpo_error *error)
 
 ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_error *error)
 {
-    const ebpo_array_in *a = &file->root_array[EBPO_A_CHUNK_CHECKSUMS];
+    const ebpo_array_in *a = &file->root_array[file->checksum_list],
+                        *index = &file->root_array[EBPO_A_SUBTREE_INDEX];
+    ebpo_read_options options = ebpo_read_threads(1);
     ebpo_error failure = EBPO_ERROR_INIT;
-    uint64_t *list = NULL;
+    uint64_t *list = NULL, *sums = NULL;
+    uint32_t *page = NULL;
     /* in a remote file, this check would send a request for each chunk; such a file is checked only
      * by the library's reader */
     if (!file->has_checksums || ebpo_input_prefetches(&ebpo_reader_own(file)->in))
@@ -651,10 +733,30 @@ ebpo_status ebpo_check_checksums(ebpo_tally *tally, const ebpo_file *file, ebpo_
     ebpo_status status = ebpo_file_locate(file, NULL, &failure);
     if (status == EBPO_OK)
         status = ebpo_long_chunk_read(file, a, &list, &failure);
-    checksum_comparison c = { tally, file, list, a->shape.rows };
+    if (status == EBPO_OK && file->checksum_list == EBPO_A_CHECKSUM_INDEX) {
+        status = ebpo_reader_make(file, EBPO_A_CHECKSUM_PAGES, 0, &options, sizeof *page, &page,
+                                  &failure);
+        if (status == EBPO_OK)
+            status = ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &options, sizeof *sums, &sums,
+                                      &failure);
+    }
+    checksum_comparison c = { .tally = tally,
+                              .file = file,
+                              .path = a->path,
+                              .list = list,
+                              .rows = a->shape.rows,
+                              .page = page,
+                              .page_rows = file->root_array[EBPO_A_CHECKSUM_PAGES].shape.rows,
+                              .index = sums,
+                              .blocks = index->shape.rows,
+                              .cols = index->shape.cols };
     if (status == EBPO_OK)
         status = compare_checksums(&c, &failure);
+    if (status == EBPO_OK)
+        status = compare_pages(&c, &failure);
     free(list);
+    ebpo_array_free(NULL, page);
+    ebpo_array_free(NULL, sums);
     if (status != EBPO_E_FORMAT)
         return status == EBPO_OK ? EBPO_OK : ebpo_fail_with(error, &failure);
     CHECK(false, "%s", failure.message);

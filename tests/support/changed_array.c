@@ -6,6 +6,7 @@
 
 #include "core/endian.h"
 #include "hdf5_read/chunk.h"
+#include "format/checksum_pages.h"
 #include "format/chunk_directory.h"
 #include "format/reader.h"
 
@@ -67,12 +68,26 @@ static uint32_t update_checksum(changeable *c, ebpo_chunk_location chunk)
     return ebpo_load32(end);
 }
 
-/* Sets the checksum of a chunk in the list of chunk checksums, if the file has the list. */
+/* Sets the checksum of a chunk in the list of chunk checksums, or in a page of checksums, if the
+ * file has a list. */
 static void update_list(changeable *c, const ebpo_array_in *a, uint64_t chunk, uint32_t sum)
 {
-    const ebpo_array_in *list = array_of(c, EBPO_A_CHUNK_CHECKSUMS);
+    const ebpo_array_in *list = array_of(c, c->file->checksum_list),
+                        *pages = array_of(c, EBPO_A_CHECKSUM_PAGES);
+    uint64_t page;
     if (!c->file->has_checksums || ebpo_schema_is_list(a->id))
         return;
+    if (pages->present && ebpo_is_paged(&c->file->info, a->id, a->level, &a->shape)) {
+        if (ebpo_checksum_pages_prepare(c->file, NULL) != EBPO_OK)
+            abort();
+        uint32_t row = a->chunks[chunk].checksum_row;
+        page = row / pages->shape.chunk_rows;
+        ebpo_store32(c->data + pages->chunks[page].address + 4 * (row % pages->shape.chunk_rows),
+                     sum);
+        sum = update_checksum(c, pages->chunks[page]);
+        a = pages;
+        chunk = page;
+    }
     ebpo_store32(c->data + list->chunks[0].address + 8 * (a->first_checksum + chunk), sum);
     (void)update_checksum(c, list->chunks[0]);
 }

@@ -4,7 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <ebpo/build.h>
+
 #include "core/endian.h"
+#include "changed_array.h"
 #include "check_main.h"
 #include "format/chunk_directory.h"
 #include "format/reader.h"
@@ -29,18 +32,37 @@ static bytes slurp(const char *path)
     return b;
 }
 
+/* Writes a mesh. `max_level`: as in ebpo_build_options. */
+static bytes write_mesh(const char *name, ebpo_mesh mesh, int max_level, ebpo_codec codec,
+                        uint64_t subtree_faces, ebpo_chunk_checksums checksums)
+{
+    ebpo_build_options build = EBPO_BUILD_OPTIONS_INIT;
+    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
+    build.leaf_faces = 4;
+    build.parts = ~0u;
+    build.max_level = max_level;
+    write.codec = codec;
+    write.subtree_faces = subtree_faces;
+    write.chunk_checksums = checksums;
+    ebpo_tree tree = model_build(mesh, &build);
+    model_write(&tree, scratch(name), &write);
+    return slurp(scratch(name));
+}
+
 /* Writes a torus. All tori have the same topology, so that uncompressed files have chunks of the
  * same sizes. `wide`: size of the torus. */
 static bytes write_torus(const char *name, double wide, ebpo_codec codec, uint64_t subtree_faces,
                          ebpo_chunk_checksums checksums)
 {
-    ebpo_write_options write = EBPO_WRITE_OPTIONS_INIT;
-    write.codec = codec;
-    write.subtree_faces = subtree_faces;
-    write.chunk_checksums = checksums;
-    ebpo_tree tree = model_build_parts(ebpo_test_torus(wide, 0.25, 60, 40), 4, ~0u);
-    model_write(&tree, scratch(name), &write);
-    return slurp(scratch(name));
+    return write_mesh(name, ebpo_test_torus(wide, 0.25, 60, 40), -1, codec, subtree_faces,
+                      checksums);
+}
+
+/* Writes a torus with several blocks of subtrees, and with pages of checksums. */
+static bytes write_paged(const char *name, double wide)
+{
+    return write_mesh(name, ebpo_test_torus(wide, 0.03125, 160, 16), 5, EBPO_CODEC_NONE, 10,
+                      EBPO_CHECKSUMS_DEFAULT);
 }
 
 static ebpo_file *open_bytes(const bytes *b)
@@ -124,10 +146,13 @@ static bool is_detected(const bytes *b, int n, uint64_t chunk)
  * checksums. */
 START_TEST(test_chunks_of_other_version_are_refused)
 {
-    uint64_t subtrees = _i ? 8 : EBPO_NO_SUBTREES, found = 0;
-    bytes b = write_torus("a.ebpo.h5", 1, EBPO_CODEC_NONE, subtrees, EBPO_CHECKSUMS_DEFAULT),
-          other =
-              write_torus("b.ebpo.h5", 1.0625, EBPO_CODEC_NONE, subtrees, EBPO_CHECKSUMS_DEFAULT);
+    uint64_t subtrees = _i ? 8 : EBPO_NO_SUBTREES, found = 0, paged = 0;
+    bytes b = _i == 2
+                  ? write_paged("a.ebpo.h5", 1)
+                  : write_torus("a.ebpo.h5", 1, EBPO_CODEC_NONE, subtrees, EBPO_CHECKSUMS_DEFAULT),
+          other = _i == 2 ? write_paged("b.ebpo.h5", 1.0625)
+                          : write_torus("b.ebpo.h5", 1.0625, EBPO_CODEC_NONE, subtrees,
+                                        EBPO_CHECKSUMS_DEFAULT);
     ebpo_file *file = open_bytes(&b), *from = open_bytes(&other);
     const ebpo_array_in *a;
     uint8_t kept[1 << 17];
@@ -144,13 +169,81 @@ START_TEST(test_chunks_of_other_version_are_refused)
             ck_assert_msg(is_detected(&b, n, k), "%s, chunk %d", a->path, (int)k);
             memcpy(at, kept, size);
             found++;
+            paged += ebpo_has_paged_checksums(file, a);
         }
     }
     ck_assert_uint_gt(found, 10);
+    ck_assert_int_eq(paged > 1, _i == 2);
     ebpo_close(file);
     ebpo_close(from);
     free(b.at);
     free(other.at);
+}
+END_TEST
+
+static unsigned pages_read(const ebpo_file *file)
+{
+    unsigned count = 0;
+    for (uint64_t i = 0; i < ebpo_shape_chunks(&file->root_array[EBPO_A_CHECKSUM_PAGES].shape); i++)
+        count += atomic_load(&file->page_read[i]);
+    return count;
+}
+
+/* The checksums of the first chunks of all arrays are together, and those of the last chunks, so
+ * that a reader of a subtree needs few pages. Reading a chunk reads only its page. */
+START_TEST(test_subtrees_need_few_pages)
+{
+    bytes b = write_mesh("a.ebpo.h5", ebpo_test_torus(1, 0.25, 400, 240), 8, EBPO_CODEC_ZSTD, 100,
+                         EBPO_CHECKSUMS_DEFAULT);
+    ebpo_file *file = open_bytes(&b);
+    const ebpo_array_in *pages = &file->root_array[EBPO_A_CHECKSUM_PAGES], *a;
+    ck_assert(pages->present && !file->root_array[EBPO_A_CHUNK_CHECKSUMS].present);
+    ck_assert_uint_eq(pages->shape.chunk_rows, EBPO_CHECKSUM_ROWS);
+    uint64_t all = ebpo_shape_chunks(&pages->shape), /* near: twice the mean rows of a block */
+        near = 2 * pages->shape.rows / file->root_array[EBPO_A_SUBTREE_INDEX].shape.rows;
+    ck_assert_uint_gt(all, near / EBPO_CHECKSUM_ROWS + 1);
+    ck_assert_uint_lt(file->root_array[EBPO_A_CHECKSUM_INDEX].shape.rows, pages->shape.rows);
+    ck_assert_int_eq(ebpo_checksum_pages_prepare(file, NULL), EBPO_OK);
+    ebpo_idle_reader *r = ebpo_idle_readers_take(&file->idle);
+    for (int n = 0; (a = array_of(file, n)); n++) {
+        uint64_t last = chunks_of(a) - 1;
+        if (!a->present || !ebpo_has_paged_checksums(file, a))
+            continue;
+        ck_assert_uint_lt(a->chunks[0].checksum_row, near);
+        ck_assert_uint_ge(a->chunks[last].checksum_row, pages->shape.rows - near);
+        ck_assert_int_eq(ebpo_reader_chunk(file, a, 0, &r->reader, r->raw, NULL), EBPO_OK);
+        ck_assert_uint_le(pages_read(file), near / EBPO_CHECKSUM_ROWS + 1);
+    }
+    ck_assert_int_eq(ebpo_file_check_content(file, NULL, NULL), EBPO_OK);
+    ck_assert_uint_eq(pages_read(file), all);
+    ebpo_idle_readers_give(&file->idle, r);
+    ebpo_close(file);
+    free(b.at);
+}
+END_TEST
+
+/* Wrong sums in /subtrees/index, with correct checksums, give an error and no other harm. */
+START_TEST(test_hostile_sums_of_pages_are_refused)
+{
+    static const uint64_t values[] = { 0, 1, UINT32_MAX, UINT64_MAX / 2, UINT64_MAX };
+    bytes b = write_paged("a.ebpo.h5", 1);
+    changeable c;
+    changeable_load(&c, scratch("a.ebpo.h5"));
+    uint64_t count = changeable_count(&c, EBPO_A_SUBTREE_INDEX);
+    for (uint64_t i = 0; i < 5 * count; i += ebpo_test_scale() < 1 ? 17 : 1) {
+        uint64_t before = changeable_put(&c, EBPO_A_SUBTREE_INDEX, i / 5, values[i % 5]);
+        ebpo_tree tree;
+        ebpo_file *file;
+        ck_assert_int_eq(ebpo_open_memory(c.data, c.size, "x", &file, NULL), EBPO_OK);
+        ebpo_status status = ebpo_file_read_tree(file, NULL, &tree, NULL);
+        ck_assert(status == EBPO_OK || status == EBPO_E_FORMAT);
+        if (status == EBPO_OK)
+            ebpo_tree_free(&tree);
+        ebpo_close(file);
+        changeable_put(&c, EBPO_A_SUBTREE_INDEX, i / 5, before);
+    }
+    changeable_free(&c);
+    free(b.at);
 }
 END_TEST
 
@@ -188,7 +281,9 @@ TEST_SUITE(chunk_checksums)
     tcase_add_checked_fixture(tests, scratch_enter, scratch_leave);
     tcase_set_timeout(tests, 120);
     tcase_add_loop_test(tests, test_chunk_checksums_list_every_chunk, 0, KINDS);
-    tcase_add_loop_test(tests, test_chunks_of_other_version_are_refused, 0, 2);
+    tcase_add_loop_test(tests, test_chunks_of_other_version_are_refused, 0, 3);
+    tcase_add_test(tests, test_subtrees_need_few_pages);
+    tcase_add_test(tests, test_hostile_sums_of_pages_are_refused);
     tcase_add_test(tests, test_files_without_checksums_are_equal);
     tcase_add_test(tests, test_invalid_checksum_option_is_refused);
     suite_add_tcase(suite, tests);

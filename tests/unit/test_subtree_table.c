@@ -295,10 +295,11 @@ static unsigned step_of(const ebpo_info *info, const placed *p)
         return list ? 200 : 100 + (unsigned)p->level;
     if (of_level)
         return list ? 400 : 300;
-    return p->id == EBPO_A_CHUNK_DIRECTORY   ? 700
-           : p->id == EBPO_A_CHUNK_CHECKSUMS ? 650
-           : p->id == EBPO_A_VERTEX_SOURCE   ? 600
-                                             : 500;
+    return p->id == EBPO_A_CHUNK_DIRECTORY                                     ? 700
+           : p->id == EBPO_A_CHUNK_CHECKSUMS || p->id == EBPO_A_CHECKSUM_INDEX ? 650
+           : p->id == EBPO_A_CHECKSUM_PAGES                                    ? 640
+           : p->id == EBPO_A_VERTEX_SOURCE                                     ? 600
+                                                                               : 500;
 }
 
 static unsigned column_of(const ebpo_info *info, const placed *p)

@@ -143,6 +143,24 @@ START_TEST(test_verify_chunk_checksums)
 }
 END_TEST
 
+/* The same, for a file with pages of checksums. */
+START_TEST(test_verify_pages_of_checksums)
+{
+    static const ebpo_array_id ids[] = { EBPO_A_CHECKSUM_PAGES, EBPO_A_CHECKSUM_INDEX };
+    changeable c;
+    write_model(ebpo_test_torus(1, 0.03125, 160, 16), ~0u, 10);
+    changeable_load(&c, path);
+    expect_fine(&c);
+    for (int k = 0; k < 2; k++) {
+        uint64_t count = changeable_count(&c, ids[k]);
+        ck_assert_uint_gt(count, 3);
+        for (uint64_t i = 0; i < count; i += steps(7))
+            expect_named(&c, ids[k], i, changeable_get(&c, ids[k], i) ^ 1);
+    }
+    changeable_free(&c);
+}
+END_TEST
+
 /* Exchanges two rows of the list with equal sizes. */
 START_TEST(test_verify_detects_swapped_chunks)
 {
@@ -214,6 +232,7 @@ TEST_SUITE(verify_subtrees)
     tcase_add_loop_test(tests, test_verify_recounts_subtree_table, 0, 2);
     tcase_add_test(tests, test_verify_subtree_offsets_against_index);
     tcase_add_test(tests, test_verify_chunk_checksums);
+    tcase_add_test(tests, test_verify_pages_of_checksums);
     tcase_add_test(tests, test_verify_detects_swapped_chunks);
     tcase_add_loop_test(tests, test_verify_subtree_table_without_parts, 0, 4);
     tcase_add_loop_test(tests, test_verify_subset_rows_of_pruned_nodes, 0, 2);

@@ -35,6 +35,7 @@ static const char *folder;
 #define TEXTURED  "51_textures"
 #define WELDED    "58_welded_within_a_distance"
 #define SUMMED    "55_chunk_checksums_of_subtrees"
+#define PAGED     "74_checksums_by_subtree"
 #define SURFACE   "07_surface"
 #define BORDER    "65_border"
 #define PATCHES   "69_surface"
@@ -592,6 +593,7 @@ typedef enum late_change {
     FLIP_HEAD,
     SWAP_CHUNK,
     MOVE_CHUNKS,
+    MOVE_PAGED_CHUNKS,
     SWAP_INDEX,
     SHORTEN,
     NOT_HDF5,
@@ -765,6 +767,7 @@ static const failed_vector failed[] = {
     { "unverified_surface_error", PATCHES, v_surface_error, NONE, "RL.8" },
     { "attributes_without_mesh", COLOURED, v_attributes_no_mesh, NONE, "R5.18" },
     { "chunk_in_place_of_another", SUMMED, NULL, MOVE_CHUNKS, "RF.4" },
+    { "paged_chunk_in_place_of_another", PAGED, NULL, MOVE_PAGED_CHUNKS, "RF.5" },
     { "chunk_checksums_of_fewer_chunks", SUMMED, v_checksums_fewer, NONE, "RF.3" },
     { "chunk_checksums_out_of_order", SUMMED, v_checksums_order, NONE, "RF.2" },
     { "attributes_image_of_another_digest", TEXTURED, v_attributes_image, NONE, "RD.9" },
@@ -818,6 +821,20 @@ static void move_chunks(const char *path, uint8_t *data)
     memcpy(kept, data + at, bytes);
     memcpy(data + at, data + other, bytes);
     memcpy(data + other, kept, bytes);
+}
+
+/* Exchanges the first two chunks of the vertices, which are one after the other. */
+static void move_paged_chunks(const char *path, uint8_t *data)
+{
+    hsize_t bytes = 0;
+    changed = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    haddr_t at = chunk_address("/mesh/vertices", &bytes);
+    H5Fclose(changed);
+    for (hsize_t i = 0; i < bytes; i++) {
+        uint8_t kept = data[at + i];
+        data[at + i] = data[at + bytes + i];
+        data[at + bytes + i] = kept;
+    }
 }
 
 /* Writes HDF5's checksum behind `size` bytes. */
@@ -874,6 +891,7 @@ static void change_bytes(const char *path, late_change late)
     case FLIP_HEAD: data[60] ^= 16; break;
     case SWAP_CHUNK: memcpy(data + faces, data + types, other_size); break;
     case MOVE_CHUNKS: move_chunks(path, data); break;
+    case MOVE_PAGED_CHUNKS: move_paged_chunks(path, data); break;
     case SWAP_INDEX: swap_index(path, data, size); break;
     case SHORTEN: /* the last chunk is behind the end that the superblock states */
         data[28] -= 4;

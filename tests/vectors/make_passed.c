@@ -756,6 +756,10 @@ static void make_sums(void)
     derive("63_chunk_checksums_of_others", "54_chunk_checksums", checksums_of_others);
     derive("64_lists_of_a_bare_file", "55_chunk_checksums_of_subtrees", with_bare_lists);
     state_size("64_lists_of_a_bare_file", put_place);
+    options = laid_out(EBPO_CODEC_NONE, EBPO_PART_MESH, 10);
+    options.chunk_checksums = EBPO_CHECKSUMS_DEFAULT;
+    build_float(&tree, ebpo_test_torus(1, 0.03125, 160, 16), (how){ 4, 16, 0, 0, 0, 0, 0 });
+    write_file("74_checksums_by_subtree", &tree, &options);
 }
 
 /* --- subtrees and gates, in files that are large enough --- */

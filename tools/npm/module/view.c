@@ -10,6 +10,7 @@
 #include "format/chunk_directory.h"
 #include "format/file_in.h"
 #include "format/pick_rows.h"
+#include "format/reader.h"
 #include "format/schema.h"
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
@@ -39,6 +40,8 @@ int EBPO_JS(ebpo_js_sums)(ebpo_js_object *object)
     ebpo_file *file = ebpo_reader_own(object->file); /* the same file, mutable */
     file->has_checksums = true;
     ebpo_status status = ebpo_chunk_checksums_read(file, &object->error);
+    if (status == EBPO_OK)
+        status = ebpo_checksum_pages_prepare(file, &object->error);
     if (status == EBPO_E_PENDING)
         file->has_checksums = false;
     ebpo_chunks_free(object->chunks);
