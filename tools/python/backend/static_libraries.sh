@@ -27,7 +27,7 @@ done
 exec 3>&1 >"$prefix/log.txt" 2>&1
 failed() { # what
     tail -n 20 "$prefix/log.txt" >&3
-    echo "static_libraries.sh: $1 failed; its last messages are above (with EBPO_LIBRARIES, all are in log.txt there)" >&3
+    echo "static_libraries.sh: $1 failed; its last messages are above (all are in log.txt of EBPO_LIBRARIES)" >&3
     exit 1
 }
 
