@@ -396,9 +396,11 @@ ebpo_status ebpo_checksum_pages_prepare(const ebpo_file *file, ebpo_error *error
     if (!file->has_checksums || file->checksum_list != EBPO_A_CHECKSUM_INDEX ||
         atomic_load(&file->pages_ready))
         return EBPO_OK;
-    /* before the lock, because reading the index also locks; two threads may read it */
-    ebpo_status status =
-        ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &options, sizeof *index, &index, error);
+    /* before the lock, because both calls also lock; two threads may read the index */
+    ebpo_status status = ebpo_file_locate(file, NULL, error);
+    if (status == EBPO_OK)
+        status =
+            ebpo_reader_make(file, EBPO_A_SUBTREE_INDEX, 0, &options, sizeof *index, &index, error);
     if (status != EBPO_OK)
         return status;
     pthread_mutex_lock(&own->lock);
