@@ -17,7 +17,7 @@
 #include "mesh/mesh_parts.h"
 
 /* A record of a position, without its lower HASH_SHIFT bits, is below EBPO_SORT_BINS. */
-enum { HASH_SHIFT = 46 };
+enum { HASH_SHIFT = 46, DIFFERENT_MAX = 16 };
 
 /* The bits of a position as doubles, in which -0 is replaced by 0. */
 typedef struct key {
@@ -55,16 +55,52 @@ static ebpo_status make_hashes(void *context, uint64_t begin, uint64_t end, void
     return EBPO_OK;
 }
 
+/* Compares two records by their positions, then by their vertices. */
+static int compare_records(const void *a, const void *b, void *context)
+{
+    const ebpo_positions *t = context;
+    uint32_t v = (uint32_t) * (const uint64_t *)a, w = (uint32_t) * (const uint64_t *)b;
+    key k = key_of(t->mesh, v), l = key_of(t->mesh, w);
+    int order = memcmp(k.bits, l.bits, sizeof k.bits);
+    return order ? order : (v > w) - (v < w);
+}
+
+/* Sets t->first of vertices with equal hashes by sorting their positions, and adds to *repeated.
+ * Returns false without memory. */
+static bool sort_positions(ebpo_positions *t, const uint64_t *record, uint64_t count,
+                           uint64_t *repeated)
+{
+    uint64_t *sorted = ebpo_alloc(count, sizeof *sorted);
+    if (!sorted)
+        return false;
+    memcpy(sorted, record, count * sizeof *sorted);
+    ebpo_sort_with(sorted, count, sizeof *sorted, compare_records, t);
+    for (uint64_t i = 1; i < count; i++) {
+        uint32_t v = (uint32_t)sorted[i], before = (uint32_t)sorted[i - 1];
+        key k = key_of(t->mesh, v), l = key_of(t->mesh, before);
+        if (t->first[v] == v && same_key(&k, &l)) {
+            t->first[v] = t->first[before];
+            ++*repeated;
+        }
+    }
+    free(sorted);
+    return true;
+}
+
 /* Sets t->first of vertices with equal hashes. record: their records, in ascending order. Returns
  * the number of vertices that repeat the position of an earlier vertex. Positions with equal hashes
- * are nearly always equal, so nearly all vertices but the first are skipped. */
-static uint64_t compare_positions(const ebpo_positions *t, const uint64_t *record, uint64_t count)
+ * are nearly always equal, so nearly all vertices but the first are skipped. If there are many
+ * different positions, which somebody may have chosen, they are sorted. */
+static uint64_t compare_positions(ebpo_positions *t, const uint64_t *record, uint64_t count)
 {
     uint64_t repeated = 0;
+    int different = 0;
     for (uint64_t i = 0; i + 1 < count; i++) {
         uint32_t v = (uint32_t)record[i];
         if (t->first[v] != v)
             continue;
+        if (++different == DIFFERENT_MAX && sort_positions(t, record + i, count - i, &repeated))
+            return repeated;
         key k = key_of(t->mesh, v);
         for (uint64_t n = i + 1; n < count; n++) {
             uint32_t later = (uint32_t)record[n];
@@ -83,9 +119,13 @@ static void take_hashes(void *context, uint64_t place, const void *records, uint
 {
     ebpo_positions *t = context;
     const uint64_t *record = records;
-    uint64_t repeated = 0;
+    uint64_t repeated = 0, released = 0;
     (void)place;
     for (uint64_t i = 0, end; i < count; i = end) {
+        if (i - released >= EBPO_ITEMS_SCATTERED) {
+            ebpo_release_pages(t->workspace);
+            released = i;
+        }
         for (end = i + 1; end < count && record[end] >> 32 == record[i] >> 32;)
             end++;
         repeated += compare_positions(t, record + i, end - i);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include <ebpo/build.h>
+#include <ebpo/subtree.h>
 
 #include "core/endian.h"
 #include "changed_array.h"
@@ -222,6 +223,24 @@ START_TEST(test_subtrees_need_few_pages)
 }
 END_TEST
 
+/* A subtree may be the first thing that is read after opening. */
+START_TEST(test_subtree_is_read_first)
+{
+    bytes b = write_paged("a.ebpo.h5", 1);
+    ebpo_file *file = open_bytes(&b);
+    const ebpo_info *info = ebpo_file_info(file);
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_subtree *subtree = NULL;
+    double p[3] = { 1.03125, 0, 0 };
+    ck_assert_msg(ebpo_subtree_open(file, ebpo_octcode_at(info, p, info->subtree_level), NULL,
+                                    &subtree, &error) == EBPO_OK,
+                  "%s", error.message);
+    ebpo_subtree_close(subtree);
+    ebpo_close(file);
+    free(b.at);
+}
+END_TEST
+
 /* Wrong sums in /subtrees/index, with correct checksums, give an error and no other harm. */
 START_TEST(test_hostile_sums_of_pages_are_refused)
 {
@@ -283,6 +302,7 @@ TEST_SUITE(chunk_checksums)
     tcase_add_loop_test(tests, test_chunk_checksums_list_every_chunk, 0, KINDS);
     tcase_add_loop_test(tests, test_chunks_of_other_version_are_refused, 0, 3);
     tcase_add_test(tests, test_subtrees_need_few_pages);
+    tcase_add_test(tests, test_subtree_is_read_first);
     tcase_add_test(tests, test_hostile_sums_of_pages_are_refused);
     tcase_add_test(tests, test_files_without_checksums_are_equal);
     tcase_add_test(tests, test_invalid_checksum_option_is_refused);

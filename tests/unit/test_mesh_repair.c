@@ -8,6 +8,7 @@
 
 #include "construct/arrange.h"
 #include "check_main.h"
+#include "core/hash.h"
 #include "core/workspace.h"
 #include "mesh/mesh_parts.h"
 #include "solids.h"
@@ -414,6 +415,33 @@ START_TEST(test_positions_find_first_vertices)
 }
 END_TEST
 
+/* Many different positions may have equal hashes, because somebody has chosen them so. */
+START_TEST(test_positions_with_equal_hashes)
+{
+    enum { DIFFERENT = 100000 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = { .vertex_count = 2 * DIFFERENT };
+    ebpo_positions found;
+    mesh.xyz64 = malloc(2 * DIFFERENT * 3 * sizeof *mesh.xyz64);
+    for (uint64_t v = 0; v < 2 * DIFFERENT; v++) {
+        double x = 0.1 * (double)(1 + v % DIFFERENT), y = 0.5;
+        uint64_t bits[2];
+        memcpy(&bits[0], &x, sizeof x);
+        memcpy(&bits[1], &y, sizeof y);
+        uint64_t z = 1 - ebpo_hash_number(ebpo_hash_number(bits[0]) + bits[1]);
+        mesh.xyz64[3 * v] = x;
+        mesh.xyz64[3 * v + 1] = y;
+        memcpy(&mesh.xyz64[3 * v + 2], &z, sizeof z);
+    }
+    ck_assert(ebpo_positions_build(&found, &mesh, 2, &silent, &error) == EBPO_OK);
+    ck_assert_uint_eq(found.repeated, DIFFERENT);
+    for (uint64_t v = 0; v < 2 * DIFFERENT; v++)
+        ck_assert_uint_eq(ebpo_positions_first(&found, (uint32_t)v), v % DIFFERENT);
+    ebpo_positions_free(&found);
+    free(mesh.xyz64);
+}
+END_TEST
+
 TEST_SUITE(mesh_repair)
 {
     Suite *suite = suite_create("mesh_repair");
@@ -426,6 +454,7 @@ TEST_SUITE(mesh_repair)
     tcase_add_loop_test(tests, test_repair_result_ignores_memory_budget, 0, 2);
     tcase_add_test(tests, test_weld_of_arranged_mesh_matches);
     tcase_add_loop_test(tests, test_positions_find_first_vertices, 0, 2);
+    tcase_add_test(tests, test_positions_with_equal_hashes);
     tcase_add_loop_test(tests, test_prepare_repairs_in_order_and_reports, 0, ebpo_test_solid_count);
     tcase_add_test(tests, test_prepare_cancel_and_size_limit);
     tcase_add_test(tests, test_build_rearranges_repaired_mesh);

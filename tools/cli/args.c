@@ -284,9 +284,23 @@ static arg_result add_output(const parser *p, const char **operands, int *count)
     return result;
 }
 
+/* Returns true if the first operand is one of the words that are expected, such as "info|check". */
+static bool is_expected(const char *words, const char *first)
+{
+    for (size_t length;; words += length + 1) {
+        length = strcspn(words, "| ");
+        if (strlen(first) == length && memcmp(words, first, length) == 0)
+            return true;
+        if (words[length] != '|')
+            return false;
+    }
+}
+
 /* Refuses a given option that cannot be used with the first operand. */
 static arg_result check_limited(const parser *p, const char *first)
 {
+    if (!is_expected(p->spec->operands, first))
+        return ARGS_RUN; /* the command refuses the operand */
     for (const arg_option *o = p->spec->options; o->name; o++)
         if (o->only && p->limited >> (o - p->spec->options) & 1 && !is_among(o->only, first))
             return refuse_args(p->spec, "--%s cannot be used with '%s', only with: %s", o->name,

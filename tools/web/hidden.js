@@ -1,5 +1,5 @@
 // Estimates which nodes are hidden behind nearer nodes and need not be fetched. Uses a coarse picture: the covered tiles of the view and their depths.
-// The test of visibility is not exact, because an error only delays fetching.
+// The test of visibility is not exact, because an error only delays fetching, or leaves a part coarser.
 const ACROSS = 48, DOWN = 32;
 const COVERED = 0.8; // a tile counts as covered when nodes cover so much of its area
 const PARALLEL = 1e-5; // in a view that is narrower at distance 1, as those of orthographic cameras are, nothing counts as hidden

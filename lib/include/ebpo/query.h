@@ -70,9 +70,9 @@ typedef struct ebpo_model_options {
      * MiB. A remote file larger than 2 MiB is loaded subtree by subtree if `memory` is 0, or if it
      * has a table of subtrees (ebpo_info.subtree_level).
      *
-     * Not included are the chunk directory of the file (24 bytes per chunk), decoders (about 250 kB
-     * per loading thread) and contexts. A context contains results; for distances, it also contains
-     * 4 bytes per subtree below the cut level, and a queue of nodes.
+     * Not included are the chunk directory of the file and its checksums (28 bytes per chunk),
+     * decoders (about 250 kB per loading thread) and contexts. A context contains results; for
+     * distances, it also contains 4 bytes per subtree below the cut level, and a queue of nodes.
      */
     uint64_t memory;
 

@@ -45,7 +45,7 @@ typedef struct ebpo_subtree_options {
 
     /*
      * Maximum memory of the subtree in bytes, including buffers for reading. 0: no maximum. The
-     * chunk directory of the file (24 bytes per chunk) does not count.
+     * chunk directory of the file and its checksums (28 bytes per chunk) do not count.
      */
     uint64_t memory;
 
