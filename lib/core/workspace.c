@@ -1,12 +1,13 @@
 /* Manages workspaces, the owners of large arrays. A large array is an extent (a range of whole
  * pages). A new extent is in memory if the extents in memory, including the new extent, take at
- * most half of the budget. Otherwise the new extent is in an unnamed temporary file. Arrays smaller
- * than LEAST_EXTENT share an extent (a pool), and arrays smaller than a page come from malloc. Each
- * extent counts as a holder of its workspace, so the workspace and its extents may be freed in any
- * order. Pages of a file count towards the budget only while they are in memory (resident). Loops
- * release these pages between pieces of work (ebpo_release_pages); the written data stay in the
- * file. Any thread may allocate and free. docs/develop/building.md describes how a build keeps to a
- * budget. */
+ * most a quarter of the budget, or at most half of it while all memory of the process without pages
+ * of files takes at most 5/8. Otherwise the new extent is in an unnamed temporary file. Arrays
+ * smaller than LEAST_EXTENT share an extent (a pool), and arrays smaller than a page come from
+ * malloc. Each extent counts as a holder of its workspace, so the workspace and its extents may be
+ * freed in any order. Pages of a file count towards the budget only while they are in memory
+ * (resident). Loops release these pages between pieces of work (ebpo_release_pages); the written
+ * data stay in the file. Any thread may allocate and free. docs/develop/building.md describes how a
+ * build keeps to a budget. */
 #include <errno.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -218,12 +219,40 @@ static extent *remove_extent(ebpo_workspace *w, const void *at)
     return found;
 }
 
+/* Resident memory of this process in bytes. */
+typedef struct residency {
+    uint64_t all;   /* all resident memory */
+    uint64_t files; /* resident pages of mapped files, including libraries */
+} residency;
+
+/* Returns the resident memory of this process. */
+static residency read_residency(const ebpo_workspace *w)
+{
+    char text[128], *at = text;
+    uint64_t pages[3]; /* numbers of pages: all pages of the process; resident pages; resident pages
+                          of files */
+    ssize_t size = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
+    text[size > 0 ? size : 0] = 0;
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        pages[i] = strtoull(at, &end, 10);
+        if (end == at)
+            /* not known; with so large values, the caller releases pages */
+            return (residency){ UINT64_MAX, UINT64_MAX };
+        at = end;
+    }
+    return (residency){ pages[1] * w->page, pages[2] * w->page };
+}
+
 /* Chooses memory or a file for a new extent, and counts its bytes. Returns true for a file. */
 static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 {
     ebpo_workspace_stats *f = &w->usage;
+    residency now = read_residency(w);
     pthread_mutex_lock(&w->lock);
-    bool filed = f->held + bytes > f->memory / 2;
+    bool filed =
+        f->held + bytes > f->memory / 2 ||
+        (f->held + bytes > f->memory / 4 && now.all - now.files + bytes > f->memory / 8 * 5);
     if (filed) {
         f->filed += bytes;
         f->filed_total += bytes;
@@ -482,31 +511,6 @@ bool ebpo_array_grow_late(ebpo_workspace *workspace, void *array, uint64_t *capa
         return true;
     return workspace && need > LATE / size ? ebpo_array_grow(workspace, array, capacity, need, size)
                                            : ebpo_grow(array, capacity, need, size);
-}
-
-/* Resident memory of this process in bytes. */
-typedef struct residency {
-    uint64_t all;   /* all resident memory */
-    uint64_t files; /* resident pages of mapped files, including libraries */
-} residency;
-
-/* Returns the resident memory of this process. */
-static residency read_residency(const ebpo_workspace *w)
-{
-    char text[128], *at = text;
-    uint64_t pages[3]; /* numbers of pages: all pages of the process; resident pages; resident pages
-                          of files */
-    ssize_t size = w->statm >= 0 ? pread(w->statm, text, sizeof text - 1, 0) : -1;
-    text[size > 0 ? size : 0] = 0;
-    for (int i = 0; i < 3; i++) {
-        char *end;
-        pages[i] = strtoull(at, &end, 10);
-        if (end == at)
-            /* not known; with so large values, the caller releases pages */
-            return (residency){ UINT64_MAX, UINT64_MAX };
-        at = end;
-    }
-    return (residency){ pages[1] * w->page, pages[2] * w->page };
 }
 
 /* Gives the memory of an extent in a file back to the system; the data stay in the file. */

@@ -36,12 +36,12 @@ START_TEST(test_workspace_spills_to_unnamed_files)
     enum { MIB = 1 << 20 };
     ebpo_workspace *w = make(8 * MIB);
     ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
-    char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 3 * MIB, 1),
+    char *small = ebpo_array_alloc(w, 1000, 1), *held = ebpo_array_alloc(w, 2 * MIB, 1),
          *filed = ebpo_array_zero(w, 5 * MIB, 1);
     ck_assert(small && held && filed);
     ebpo_workspace_get_stats(w, &f);
     ck_assert_uint_eq(f.memory, 8 * MIB);
-    ck_assert_uint_eq(f.held, 3 * MIB);
+    ck_assert_uint_eq(f.held, 2 * MIB);
     ck_assert_uint_eq(f.filed, 5 * MIB);
     ck_assert_int_eq(scratch_entries(), 0);
     for (int i = 0; i < 5 * MIB; i++)
@@ -52,6 +52,32 @@ START_TEST(test_workspace_spills_to_unnamed_files)
     ebpo_workspace_free(w); /* blocks remain valid after the workspace is freed */
     ck_assert(filed[0] == 7 && filed[5 * MIB - 1] == 7);
     ebpo_array_free(w, filed);
+}
+END_TEST
+
+/* Allocates 30 % of the budget. Returns the bytes that went to a file. */
+static uint64_t filed_of_30_percent(uint64_t memory)
+{
+    ebpo_workspace *w = make(memory);
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
+    void *array = ebpo_array_alloc(w, memory / 10 * 3, 1);
+    ck_assert(array);
+    ebpo_workspace_get_stats(w, &f);
+    ebpo_array_free(w, array);
+    ebpo_workspace_free(w);
+    return f.filed;
+}
+
+/* Memory that is not the workspace's counts too. */
+START_TEST(test_workspace_spills_for_other_memory)
+{
+    enum { MIB = 1 << 20 };
+    volatile char *other = malloc(40 * MIB);
+    for (int i = 0; i < 40 * MIB; i += 4096)
+        other[i] = 1;
+    ck_assert_uint_gt(filed_of_30_percent(64 * MIB), 0);
+    free((void *)other);
+    ck_assert_uint_eq(filed_of_30_percent(UINT64_C(1024) * MIB), 0);
 }
 END_TEST
 
@@ -223,6 +249,8 @@ TEST_SUITE(workspace)
     tcase_set_timeout(tests, 120);
     tcase_add_test(tests, test_workspace_spills_to_unnamed_files);
     tcase_add_test(tests, test_workspace_growth_keeps_content);
+    if (access("/proc/self/statm", R_OK) == 0) /* else the memory of the process is not known */
+        tcase_add_test(tests, test_workspace_spills_for_other_memory);
     if (LETS_GO) {
         tcase_add_test(tests, test_workspace_releases_file_pages);
         tcase_add_loop_test(tests, test_workspace_loops_release_pages, 0, 4);
