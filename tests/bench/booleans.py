@@ -130,7 +130,7 @@ def page(arguments, results):
     yield ""
     yield f"Made by `tests/bench/booleans.py BUILD_DIR {arguments.model.name} --subdivide {arguments.subdivide} --rounds"
     yield f"{arguments.rounds} --python PYTHON --corefine-below {arguments.corefine_below}` on {measured.machine()}."
-    yield f"The load average was {os.getloadavg()[2]:.0f}, which makes wall-clock times too long. B is A, turned and moved"
+    yield f"The load average was {os.getloadavg()[2]:.0f}. B is A, turned and moved"
     yield "by a twentieth of its size. Times and peaks are of whole commands, reading and writing included, on all cores;"
     yield "medians of the rounds. `ebpo` reads .ebpo.h5 files, the others PLY files; CGAL writes OFF."
     yield ""
