@@ -331,15 +331,15 @@ static needed list_needed(const searching *g, double limit, uint32_t but)
  * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
  * first 3/16 of this interval are requested. Measured for 60 points anywhere in the box of a model
  * of 4.3 million faces, per query: 11.5 round trips and 999 kB without these hints; 6.9 round trips
- * and 1,040 kB with 3/16; 6.0 round trips and 1,103 kB with 1/2. With deep bounds, which make the
- * interval short, the first 17/20 are requested, also before a face is found. (For the points of
- * DEEP_LEVELS_REMOTE, 1/2 takes 5.1 sets of requests a query and fetches the 239 needed subtrees;
- * 9/10 takes 2.1 sets and fetches 245; 1 takes one set and fetches 298.) For far points, whose
- * bounds are keys (point_bounds.h), no hints are sent. */
+ * and 1,040 kB with 3/16; 6.0 round trips and 1,103 kB with 1/2. After limit_by_cells, the
+ * interval is short, and the first 17/20 are requested, also before a face is found. (For the
+ * points of DEEP_LEVELS_REMOTE, 1/2 takes 5.1 sets of requests a query and fetches the 239 needed
+ * subtrees; 9/10 takes 2.1 sets and fetches 245; 1 takes one set and fetches 298.) For far points,
+ * whose bounds are keys (point_bounds.h), no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
-    double share = c->model->deep ? 0.85 : g->n->found ? 0.1875 : 0;
+    double share = g->limited ? 0.85 : g->n->found ? 0.1875 : 0;
     double limit = share > 0 ? lower + (g->n->limit - lower) * share : lower;
     if (g->ranking.far || lower <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
         is_in_memory(c, below))
