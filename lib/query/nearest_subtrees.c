@@ -345,10 +345,6 @@ static void hint_subtrees(searching *g, uint32_t below, double lower)
         is_in_memory(c, below))
         return;
     needed list = list_needed(g, limit, below);
-    for (int i = 0; i < 4 && !list.all; i++) {
-        limit = lower + (limit - lower) / 2;
-        list = list_needed(g, limit, below);
-    }
     g->hinted = list.all ? limit : lower;
     list.below[list.count] = below;
     ebpo_context_hint(c, list.below, list.count + 1);
