@@ -100,14 +100,14 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  * are read together, after queries have spent about as much time on loading subtrees without need
  * as reading deep bounds takes. So they delay neither opening a model nor queries along a path.
  * For a remote file, a query reads them before it loads many subtrees: as soon as they have a small
- * part of the bytes of the subtrees that may have the nearest face. For 12 points deep inside a
- * model of 4.3 million faces, a query takes 302 requests and 7.40 MB without deep bounds, 106
- * requests and 2.69 MB with them. Their memory counts towards the quota of skeletons. */
+ * part of the bytes of the subtrees that may have the nearest face. For 11 points deep inside a
+ * model of 4.3 million faces, a query takes 266 requests and 7.57 MB without deep bounds, 47
+ * requests and 2.89 MB with them. Their memory counts towards the quota of skeletons. */
 
-/* Reads the deep bounds, unless they were read before, the quota is too small, or there are no
- * levels below the cut level. Fails only if bytes are not available yet (EBPO_E_PENDING); if the
- * file cannot be read, later queries fail. */
-EBPO_MUST_USE ebpo_status ebpo_deep_bounds_make(ebpo_model *model, ebpo_error *error);
+/* Reads deep bounds of `levels` levels, or of fewer levels if the quota is too small or the file
+ * has fewer levels below the cut level. Does nothing if some were read before. Fails only if bytes
+ * are not available yet (EBPO_E_PENDING); if the file cannot be read, later queries fail. */
+EBPO_MUST_USE ebpo_status ebpo_deep_bounds_make(ebpo_model *model, int levels, ebpo_error *error);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
  * bounds when enough such subtrees have been loaded. Any thread may call this function. */

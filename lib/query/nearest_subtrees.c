@@ -55,9 +55,12 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
     return first;
 }
 
-/* Number of levels of deep bounds. Each level takes four times the memory of the level above it; a
- * third level would save only a tenth of the remaining loads (docs/develop/design.md). */
-enum { DEEP_LEVELS = 2 };
+/* Greatest number of levels of deep bounds. Each level takes four times the memory of the level
+ * above it. For a local file, a third level would save only a tenth of the remaining loads
+ * (docs/develop/design.md). For a remote file, a cold query that is far from all faces loads 22
+ * subtrees with three levels and 30 with two (means of 11 points deep inside a model of 4.3 million
+ * faces), and the third level has the bytes of five subtrees. */
+enum { DEEP_LEVELS = 2, DEEP_LEVELS_REMOTE = 3 };
 /* A *new* subtree has no skeleton, because it was never loaded. A query near the previous query
  * loads at most a few new subtrees. If a query loads more than NEW_NEEDED new subtrees, the excess
  * counts as loaded without need. Deep bounds are read after LOADS_TO_READ loads without need, which
@@ -66,10 +69,10 @@ enum { NEW_NEEDED = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
-/* Returns the last level of deep bounds. */
-static int last_deep_level(const ebpo_model *m)
+/* Returns the level that is `levels` below the cut level, or the last level of the file. */
+static int deep_level(const ebpo_model *m, int levels)
 {
-    int level = m->top->cut_level + DEEP_LEVELS, last = m->info->level_count - 1;
+    int level = m->top->cut_level + levels, last = m->info->level_count - 1;
     return level < last ? level : last;
 }
 
@@ -89,13 +92,13 @@ static ebpo_status read_levels(ebpo_model *m, int level, ebpo_error *error)
     return status == EBPO_E_LIMIT ? EBPO_OK : status;
 }
 
-ebpo_status ebpo_deep_bounds_make(ebpo_model *m, ebpo_error *error)
+ebpo_status ebpo_deep_bounds_make(ebpo_model *m, int levels, ebpo_error *error)
 {
     ebpo_status status = EBPO_E_LIMIT;
     ebpo_error why = EBPO_ERROR_INIT;
     if (!m->skeletons || atomic_exchange(&m->deep_begun, true))
         return EBPO_OK;
-    for (int level = last_deep_level(m); level > m->top->cut_level && status == EBPO_E_LIMIT;
+    for (int level = deep_level(m, levels); level > m->top->cut_level && status == EBPO_E_LIMIT;
          level--)
         status = read_levels(m, level, &why);
     if (status != EBPO_E_PENDING)
@@ -111,7 +114,7 @@ void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
     uint64_t more = loaded - NEW_NEEDED;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
         (void)!ebpo_deep_bounds_make(
-            m, NULL); /* The file is local, so the result is never EBPO_E_PENDING. */
+            m, DEEP_LEVELS, NULL); /* The file is local, so the result is never EBPO_E_PENDING. */
 }
 
 /* A search for the least lower bound among the deepest nodes of the deep bounds. */
@@ -119,6 +122,9 @@ typedef struct deep_search {
     const ebpo_top *top;
     const ebpo_ranking *ranking;
     double best; /* least bound of a deepest node so far */
+    /* upper bound of the distance (or key) of the nearest face, from the visited gray nodes: each
+     * of them has a face */
+    double upper;
 } deep_search;
 
 typedef struct deep_child {
@@ -165,17 +171,21 @@ static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double pa
     deep_child child[8];
     int count = rank_deep_children(g, gray, cell, parent, child);
     for (int i = 0; i < count && child[i].lower < g->best; i++)
-        if (ebpo_entry_kind_of(child[i].entry) == EBPO_ENTRY_GRAY)
+        if (ebpo_entry_kind_of(child[i].entry) == EBPO_ENTRY_GRAY) {
+            g->upper = fmin(g->upper, ebpo_rank_cell_end(g->ranking, child[i].cell));
             search_deep(g, child[i].entry, child[i].cell, child[i].lower);
-        else
+        } else {
             g->best = child[i].lower;
+        }
 }
 
 /* Returns a guaranteed lower bound of the distance to the faces in the cell of a node of the cut
  * level, from deep bounds. `lower`: a known lower bound; the result is at least this bound. Once a
- * bound is beyond `limit`, no better bound is searched for. Any thread may call this function. */
+ * bound is beyond `limit`, no better bound is searched for. *upper: is lowered to an upper bound of
+ * the distance to the model's nearest face, if one is found; NULL is allowed. (For a far point, all
+ * bounds are keys.) Any thread may call this function. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
-                              double limit)
+                              double limit, double *upper)
 {
     const ebpo_model *m = ranking->model;
     const ebpo_top *top = atomic_load_explicit(&m->deep, memory_order_acquire);
@@ -187,8 +197,10 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
         ;
     if (d.level < level || ebpo_entry_kind_of(d.entry) != EBPO_ENTRY_GRAY)
         return lower;
-    deep_search g = { top, ranking, nextafter(limit, INFINITY) };
+    deep_search g = { top, ranking, nextafter(limit, INFINITY), INFINITY };
     search_deep(&g, d.entry, node->cell, lower);
+    if (upper)
+        *upper = fmin(*upper, g.upper);
     return fmax(lower, g.best);
 }
 
@@ -206,6 +218,7 @@ typedef struct searching {
     ebpo_ranking ranking;
     unsigned new_loads; /* number of new subtrees that this search loaded */
     double hinted;      /* prefetch hints were sent for all new subtrees up to this bound */
+    bool limited;       /* limit_by_cells was called */
 } searching;
 
 /* Adds a node to the queue if its bound is within the limit. */
@@ -272,50 +285,69 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
     return node;
 }
 
-/* Returns true if a subtree is new, was not searched by this query, and may have a face within
- * `limit`. */
-static bool is_needed(const searching *g, uint32_t below, double limit)
+/* A list of new subtrees, other than `but`, that this query has not searched and that may have a
+ * face within `limit`. */
+typedef struct needed {
+    const searching *g;
+    double limit;
+    uint32_t but;
+    bool all; /* false: the list is full, and there may be more such subtrees */
+    unsigned count;
+    uint32_t below[EBPO_CACHE_AHEAD + 1]; /* with space for `but` */
+} needed;
+
+/* Adds the subtrees at or below a node. `lower`: lower bound of the distance to the node. */
+static void add_needed(needed *l, ebpo_node node, double lower)
 {
-    const ebpo_model *m = g->c->model;
-    ebpo_node node = node_below(m, below);
-    return !is_searched(g->c, below) && !ebpo_skeletons_find(m->skeletons, below) &&
-           bound_below_cut(&g->ranking, &node, 0, limit) <= limit;
+    const searching *g = l->g;
+    if (!l->all || lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
+        return;
+    if (!ebpo_node_is_subtree_root(&node)) {
+        ebpo_ranked child[8];
+        int count = ebpo_rank_children(&g->ranking, &node, lower, l->limit, child);
+        for (int i = 0; i < count; i++)
+            add_needed(l, child[i].node, child[i].lower);
+        return;
+    }
+    uint32_t below = ebpo_entry_value(node.entry);
+    if (below == l->but || is_searched(g->c, below) ||
+        ebpo_skeletons_find(g->c->model->skeletons, below) ||
+        bound_below_cut(&g->ranking, &node, lower, l->limit, NULL) > l->limit)
+        return;
+    l->all = l->count < EBPO_CACHE_AHEAD;
+    if (l->all)
+        l->below[l->count++] = below;
 }
 
-/* Lists the new subtrees other than `below` that this query has not searched and that may have a
- * face within `limit`. Returns their number. *all: false if there may be more of them. */
-static unsigned list_needed(const searching *g, uint32_t below, double limit,
-                            uint32_t out[EBPO_CACHE_AHEAD], bool *all)
+static needed list_needed(const searching *g, double limit, uint32_t but)
 {
-    uint64_t near[EBPO_CACHE_AHEAD];
-    unsigned found = ebpo_subtrees_near(g->c->model, g->n->p, limit, near), count = 0;
-    for (unsigned i = 0; i < found; i++)
-        if (near[i] != below && is_needed(g, (uint32_t)near[i], limit))
-            out[count++] = (uint32_t)near[i];
-    *all = found < EBPO_CACHE_AHEAD;
-    return count;
+    needed l = { .g = g, .limit = limit, .but = but, .all = true };
+    add_needed(&l, ebpo_model_root(g->c->model), 0);
+    return l;
 }
 
 /* Before a subtree of a remote file is entered, sends prefetch hints for it and for other new
  * subtrees that the search probably needs, so that one round trip fetches all of them. The result
  * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
- * first 3/16 of this interval are requested (in the first half, if there are deep bounds). Measured
- * for 60 points anywhere in the box of a model of 4.3 million faces, per query: 11.5 round trips
- * and 999 kB without these hints; 6.9 round trips and 1,040 kB with 3/16; 6.0 round trips and 1,103
- * kB with 1/2. For far points, whose bounds are keys (point_bounds.h), no hints are sent. */
+ * first 3/16 of this interval are requested. Measured for 60 points anywhere in the box of a model
+ * of 4.3 million faces, per query: 11.5 round trips and 999 kB without these hints; 6.9 round trips
+ * and 1,040 kB with 3/16; 6.0 round trips and 1,103 kB with 1/2. After limit_by_cells, the
+ * interval is short, and the first 17/20 are requested, also before a face is found. (For the
+ * points of DEEP_LEVELS_REMOTE, 1/2 takes 5.1 sets of requests a query and fetches the 239 needed
+ * subtrees; 9/10 takes 2.1 sets and fetches 245; 1 takes one set and fetches 298.) For far points,
+ * whose bounds are keys (point_bounds.h), no hints are sent. */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
-    double share = c->model->deep ? 0.5 : 0.1875;
-    double limit = g->n->found ? lower + (g->n->limit - lower) * share : lower;
-    if (g->ranking.far || limit <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
+    double share = g->limited ? 0.85 : g->n->found ? 0.1875 : 0;
+    double limit = share > 0 ? lower + (g->n->limit - lower) * share : lower;
+    if (g->ranking.far || lower <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
         is_in_memory(c, below))
         return;
-    uint32_t hinted[EBPO_CACHE_AHEAD + 1] = { below };
-    bool all;
-    unsigned count = 1 + list_needed(g, below, limit, hinted + 1, &all);
-    g->hinted = all ? limit : lower;
-    ebpo_context_hint(c, hinted, count);
+    needed list = list_needed(g, limit, below);
+    g->hinted = list.all ? limit : lower;
+    list.below[list.count] = below;
+    ebpo_context_hint(c, list.below, list.count + 1);
 }
 
 /* Searches all faces of a subtree, unless this query has already searched the subtree. */
@@ -484,43 +516,69 @@ static bool add_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *
 
 static double deep_bound(const searching *g, const ebpo_ranked *r)
 {
-    return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n));
+    return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n), NULL);
 }
 
-/* Compares the bytes of the deep bounds with the bytes of all subtrees that this search may have to
- * load. Returns true if the deep bounds have less than a quarter of these bytes. (With deep bounds,
- * the search loads about a third of these subtrees.) Returns false if the bytes of the deep bounds
- * are not known, because their chunks could not be located. */
-static bool deep_bounds_pay(const searching *g)
+/* Returns the number of levels of deep bounds that this search should read. The levels have less
+ * than a quarter of the bytes of all subtrees that the search may have to load without them. (With
+ * deep bounds, the search loads about a third of these subtrees.) Counts no levels whose chunks
+ * could not be located. */
+static int paying_levels(const searching *g)
 {
-    uint32_t needed[EBPO_CACHE_AHEAD];
     const ebpo_model *m = g->c->model;
-    bool all;
-    unsigned subtrees = list_needed(g, UINT32_MAX, g->n->limit, needed, &all);
-    ebpo_hints levels = EBPO_HINTS_INIT(m->file);
-    for (int level = last_deep_level(m); level > m->top->cut_level; level--)
-        ebpo_hint_level(&levels, level, EBPO_PART_MESH);
+    unsigned subtrees = list_needed(g, g->n->limit, UINT32_MAX).count;
     double subtree_bytes = (double)m->file->in.source.size / (double)m->top->below_count;
-    bool known = !levels.failed;
-    double bytes = (double)ebpo_hints_bytes(&levels);
-    return known && bytes < 0.25 * subtree_bytes * (double)subtrees;
+    double left = 0.25 * subtree_bytes * (double)subtrees;
+    int levels = 0, most = deep_level(m, DEEP_LEVELS_REMOTE) - m->top->cut_level;
+    while (levels < most) {
+        ebpo_hints next = EBPO_HINTS_INIT(m->file);
+        ebpo_hint_level(&next, m->top->cut_level + levels + 1, EBPO_PART_MESH);
+        bool known = !next.failed;
+        left -= (double)ebpo_hints_bytes(&next);
+        if (!known || left <= 0)
+            break;
+        levels++;
+    }
+    return levels;
 }
 
-/* For a remote file, reads deep bounds as soon as they pay. If the source of bytes
- * returns EBPO_E_PENDING, this point and all later points of the batch that need deep bounds wait
- * for the next call; only the first of them requests the bytes. A query with a deadline does not
- * read them, because the read could take longer. */
-static ebpo_status improve_bounds(searching *g, ebpo_error *error)
+/* Lowers the limit of the search by the cells of deep bounds, so that few subtrees are within it
+ * before a face is found. */
+static void limit_by_cells(searching *g)
+{
+    uint64_t near[EBPO_CACHE_AHEAD];
+    ebpo_nearest *n = g->n;
+    unsigned count = ebpo_subtrees_near(g->c->model, n->p, n->limit, near);
+    for (unsigned i = 0; i < count; i++) {
+        ebpo_node node = node_below(g->c->model, (uint32_t)near[i]);
+        bound_below_cut(&g->ranking, &node, 0, n->limit, &n->upper);
+        n->limit = fmin(n->limit, n->upper);
+    }
+    g->limited = true;
+}
+
+/* For a remote file, reads deep bounds as soon as they pay: after a face is found, or before it if
+ * the point is so far from all faces that the first face will exclude few subtrees. `lower`: bound
+ * of all faces that were not searched. If the source of bytes returns EBPO_E_PENDING, this point
+ * and all later points of the batch that need deep bounds wait for the next call; only the first of
+ * them requests the bytes. A query with a deadline does not read them, because the read could take
+ * longer. */
+static ebpo_status improve_bounds(searching *g, double lower, ebpo_error *error)
 {
     ebpo_model *m = g->c->model;
-    bool wanted = g->n->found && !g->n->deadline && !g->ranking.far && !m->deep_begun &&
-                  m->skeletons && ebpo_input_prefetches(&m->file->in);
-    if (!wanted || !deep_bounds_pay(g))
+    ebpo_status status = EBPO_OK;
+    if (g->ranking.far || g->n->deadline || !ebpo_input_prefetches(&m->file->in))
         return EBPO_OK;
-    if (g->c->deep_pending) /* the batch keeps the error of its first pending point */
+    bool wanted = !m->deep_begun && m->skeletons && (g->n->found || lower > 0.6 * g->n->limit);
+    int levels = wanted ? paying_levels(g) : 0;
+    if (levels && g->c->deep_pending) /* the batch keeps the error of its first pending point */
         return EBPO_E_PENDING;
-    ebpo_status status = ebpo_deep_bounds_make(m, error);
-    g->c->deep_pending = status == EBPO_E_PENDING;
+    if (levels) {
+        status = ebpo_deep_bounds_make(m, levels, error);
+        g->c->deep_pending = status == EBPO_E_PENDING;
+    }
+    if (status == EBPO_OK && m->deep && !g->limited)
+        limit_by_cells(g);
     return status;
 }
 
@@ -529,7 +587,7 @@ static ebpo_status improve_bounds(searching *g, ebpo_error *error)
  * searched. */
 static ebpo_status inspect_new(searching *g, const ebpo_ranked *r, ebpo_error *error)
 {
-    ebpo_status status = improve_bounds(g, error);
+    ebpo_status status = improve_bounds(g, r->lower, error);
     if (status != EBPO_OK)
         return status;
     ebpo_ranked all = { r->node, deep_bound(g, r), OWNED };
@@ -603,7 +661,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
 
 ebpo_status ebpo_nearest_first(ebpo_context *c, ebpo_nearest *n, ebpo_error *error)
 {
-    searching g = { c, n, ebpo_ranking_of(c->model, n->p, &n->far), 0, -1 };
+    searching g = { c, n, ebpo_ranking_of(c->model, n->p, &n->far), 0, -1, false };
     if (!c->model->whole)
         return search_parts(&g, error);
     ebpo_nearest_search(n, c, c->model->whole);

@@ -1,17 +1,20 @@
 /* Counts the subtrees that an exact distance query must read.
  *
- *     needed_subtrees FILE.ebpo.h5 POINTS MEMORY
+ *     needed_subtrees FILE.ebpo.h5 POINTS MEMORY [URL]
  *         POINTS: 3 doubles for each point, as written by `ebpo bench --save-points`
  *         MEMORY: budget in bytes
+ *         URL: address of the same file; requests all needed subtrees together, as a query could
+ *              that knew them in advance
  *
  * A subtree is needed if no envelope of the file shows that all of its faces are farther than the
  * nearest face. For each level, prints the number of subtrees that remain when the envelopes down
  * to this level are known; then the subtrees that the queries searched and loaded. All values are
- * means over the points. */
+ * means over the points. With URL, prints the number of requested subtrees. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "query/model_parts.h"
 #include "query/query_model.h"
@@ -51,9 +54,19 @@ typedef struct walk {
     const ebpo_top *top;
     ebpo_ranking ranking;
     int cut_level;
-    double limit;  /* distance of the nearest face */
-    uint64_t near; /* number of subtrees that are not farther */
+    double limit;                 /* distance of the nearest face */
+    uint64_t near;                /* number of subtrees that are not farther */
+    const ebpo_node_table *nodes; /* of the model */
+    bool *needed; /* [subtrees of the model] is set for those that are not farther */
 } walk;
+
+/* Sets w->needed for the subtree that has this cell. */
+static void mark(walk *w, ebpo_cell cell)
+{
+    uint32_t entry = ebpo_descend(w->nodes, cell.level, cell.at).entry;
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SUBTREE_ROOT)
+        w->needed[ebpo_entry_value(entry)] = true;
+}
 
 /* Returns true if a node that is not farther than the limit has a leaf or a node of the deepest
  * known level that is not farther. Counts the subtrees of which this is true. */
@@ -71,9 +84,38 @@ static bool is_near(walk *w, uint32_t entry, ebpo_cell cell)
     for (unsigned octant = 0; octant < 8 && kind == EBPO_ENTRY_GRAY; octant++)
         near |= is_near(w, ebpo_table_child(&w->top->nodes, entry, octant),
                         ebpo_cell_child(cell, octant));
-    w->near += near && (cell.level == w->cut_level ||
-                        (cell.level < w->cut_level && kind != EBPO_ENTRY_GRAY));
+    if (near &&
+        (cell.level == w->cut_level || (cell.level < w->cut_level && kind != EBPO_ENTRY_GRAY))) {
+        w->near++;
+        mark(w, cell);
+    }
     return near;
+}
+
+/* Opens the file at `url`, and loads the needed subtrees after one hint for all of them. */
+static void request_all(const char *url, const ebpo_model_options *how, const bool *needed)
+{
+    ebpo_file *file;
+    ebpo_model *m;
+    ebpo_context *c;
+    check(ebpo_open(url, &file, &error));
+    check(ebpo_model_new(file, how, &m, &error));
+    check(ebpo_context_new(m, &c, &error));
+    uint64_t count = 0;
+    uint32_t *below = calloc(m->top->below_count, sizeof *below);
+    for (uint32_t i = 0; below && i < m->top->below_count; i++)
+        if (needed[i])
+            below[count++] = i;
+    ebpo_top_hint(m->top, m->chunks, below, count, ebpo_subtree_needs(false));
+    for (uint64_t i = 0; i < count; i++) {
+        ebpo_accel *subtree;
+        check(ebpo_context_subtree(c, below[i], &subtree, &error));
+    }
+    printf("requested: %d subtrees\n", (int)count);
+    free(below);
+    ebpo_context_free(c);
+    ebpo_model_free(m);
+    ebpo_close(file);
 }
 
 int main(int argc, char **argv)
@@ -83,8 +125,8 @@ int main(int argc, char **argv)
     ebpo_context *c;
     ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
     uint64_t count;
-    if (argc != 4) {
-        fprintf(stderr, "usage: needed_subtrees FILE.ebpo.h5 POINTS MEMORY\n");
+    if (argc != 4 && argc != 5) {
+        fprintf(stderr, "usage: needed_subtrees FILE.ebpo.h5 POINTS MEMORY [URL]\n");
         return 2;
     }
     double *points = read_points(argv[2], &count), *distance = calloc(count + 1, sizeof *distance);
@@ -101,8 +143,10 @@ int main(int argc, char **argv)
         check(ebpo_distance(c, points + 3 * i, NULL, &result, &error));
         distance[i] = fabs(result.distance);
     }
-    for (int level = m->top->cut_level; level < m->info->level_count; level++) {
-        walk w = { .cut_level = m->top->cut_level };
+    bool *needed = calloc(m->top->below_count, sizeof *needed);
+    for (int level = m->top->cut_level; needed && level < m->info->level_count; level++) {
+        memset(needed, false, m->top->below_count * sizeof *needed);
+        walk w = { .cut_level = m->top->cut_level, .nodes = &m->top->nodes, .needed = needed };
         ebpo_top *top;
         check(ebpo_top_read_envelopes(&top, file, level, 0, &error));
         w.top = top;
@@ -116,10 +160,13 @@ int main(int argc, char **argv)
     }
     printf("searched: %.2f, loaded: %.2f\n", (double)c->searched / (double)count,
            (double)c->loaded / (double)count);
+    if (argc == 5 && needed)
+        request_all(argv[4], &how, needed);
     ebpo_context_free(c);
     ebpo_model_free(m);
     ebpo_close(file);
     free(points);
     free(distance);
+    free(needed);
     return 0;
 }

@@ -1,17 +1,16 @@
 #!/usr/bin/env python3
-"""Remakes docs/measured/remote.md: requests, bytes, round trips and times of queries by URL, compared with HDF5's ros3
-driver and h5wasm.
+"""Makes docs/measured/remote.md: requests, bytes, round trips and times of queries by URL.
 
-    tests/bench/remote.py BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5
-        --before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 --ply SMALL.ply -o docs/measured/remote.md
-        [--json FILE [--only PATTERN]]
+    tests/bench/remote.py BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 -o docs/measured/remote.md
+        [--before BUILD_DIR LARGE.ebpo.h5 SMALL.ebpo.h5 [--ply SMALL.ply]] [--readers] [--json FILE [--only PATTERN]]
 
-BUILD_DIR: a release build inside its checkout, whose viewer is measured, too. --before also measures an older build
-with its files, and the new build with the old files; only --json stores these results. nginx serves the files; its log
-has the requests. A proxy in front of nginx adds latency, and limits the rate for the viewer. --only repeats the
-measurements in --json whose name matches. The handwritten end of an existing page is kept.
-Needs nginx, chromium, python3-h5py, npm (h5wasm is installed below BUILD_DIR) and
-`sh tools/install-deps.sh --tests`.
+BUILD_DIR: a release build inside its checkout, whose viewer is measured, too. nginx serves the files; its log has the
+requests. A proxy in front of nginx adds latency, and limits the rate for the viewer. The handwritten end of an
+existing page is kept. --before also measures an older build with its files, and the new build with the old files;
+with --ply, also the time to convert SMALL.ply. Only --json stores these results. --only repeats the measurements in
+--json whose name matches. --readers compares with HDF5's ros3 driver and h5wasm.
+Needs nginx, chromium and `sh tools/install-deps.sh --tests`; for --readers also python3-h5py and npm, which installs
+h5wasm below BUILD_DIR.
 """
 import argparse
 import contextlib
@@ -114,12 +113,14 @@ def measure_sides(take, sides, server, line, work):
             take(f"{side.name}/{name}",
                  lambda s=side, r=row: {"what": r.what, "command": r.command,
                                         **url_queries.measure(server, line, s, r, work)})
+    take(f"{sides[-1].name}/known", lambda: url_queries.known_in_advance(server, sides[-1], work))
     crowd = large.crowd("crowd.txt", EQUAL)
     near = Line(server.port, 0)
     take(f"{sides[-1].name}/same", lambda: url_queries.same_results(sides[-1], near, "large", crowd))
     for side in sides:
         take(f"{side.name}/size", lambda s=side: {which: f.stat().st_size
                                                   for which, f in s.files.items()})
+        take(f"{side.name}/without gaps", lambda s=side: url_queries.without_gaps(s, work))
         take(f"{side.name}/local", lambda s=side: url_queries.local(s, s.files["large"], OPENINGS, PATH))
         take(f"{side.name}/viewer", lambda s=side: view(s, large, work))
 
@@ -132,10 +133,9 @@ def measure_drivers(take, side, server, work):
                                                        LATENCIES, 3))
 
 
-def h5wasm_below(work):
+def install_h5wasm(work):
     subprocess.run(["npm", "install", "--silent", "--no-audit", "--no-fund", "--prefix", work,
                     "h5wasm@0.8", "h5wasm-plugins"], check=True)
-    return json.loads((work / "node_modules/h5wasm/package.json").read_text())["version"]
 
 
 def links_of(sides, work):
@@ -154,6 +154,8 @@ def command_of(options):
         command += ["--before", "BUILD_DIR_BEFORE", *names(options.before[1:])]
     if options.ply:
         command += ["--ply", options.ply.name]
+    if options.readers:
+        command.append("--readers")
     return shlex.join(command + ["-o", "docs/measured/remote.md"])
 
 
@@ -164,11 +166,14 @@ def parse():
     parser.add_argument("files", type=pathlib.Path, nargs=2)
     parser.add_argument("--before", type=pathlib.Path, nargs=3)
     parser.add_argument("--ply", type=pathlib.Path)
+    parser.add_argument("--readers", action="store_true")
     parser.add_argument("--json")
     parser.add_argument("--only")
-    parser.add_argument("--note", help="a sentence for the page")
     parser.add_argument("-o", "--output", required=True)
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.ply and not options.before:
+        parser.error("--ply needs --before, because it compares two builds")
+    return options
 
 
 def sides_of(options):
@@ -188,15 +193,17 @@ def main():
     work.mkdir(exist_ok=True)
     nginx = re.search(r"nginx/\S+", subprocess.run(["nginx", "-v"], capture_output=True, text=True,
                                                    check=True).stderr)[0]
-    programs = f"{nginx}, h5wasm {h5wasm_below(work)}"
+    if options.readers:
+        install_h5wasm(work)
     with contextlib.closing(Server(work, drivers.ROOT / "samples/nginx-ebpo.conf",
                                    links_of(sides, work))) as server:
         line = Line(server.port, ROUND_TRIP)
         measure_sides(results.take, sides, server, line, work)
-        measure_drivers(results.take, sides[-1], server, work)
-    if options.ply and options.before:
+        if options.readers:
+            measure_drivers(results.take, sides[-1], server, work)
+    if options.ply:
         results.take("build", lambda: build_in_turns([sides[0], sides[-1]], options.ply, work))
-    page = remote_page.made(results.found, command_of(options), programs, options.note)
+    page = remote_page.made(results.found, command_of(options), nginx)
     pathlib.Path(options.output).write_text(reflow(page + handwritten(options.output)))
 
 

@@ -124,7 +124,7 @@ static void free_large(void)
 /* A query that needs many subtrees requests several of them together. */
 START_TEST(test_remote_deep_query_round_trips)
 {
-    enum { WAVES = 16 }; /* 23 when each subtree is requested alone */
+    enum { WAVES = 3 }; /* 23 when each subtree is requested alone, 8 without limit_by_cells */
     static const double p[3] = { 2.1, 0.1, 0.05 };
     counted_source c;
     ebpo_file *far = counted_open(&c, l.packed, true);
@@ -139,7 +139,7 @@ END_TEST
 /* A query at almost equal distances from many subtrees reads deep bounds, and then few subtrees. */
 START_TEST(test_remote_axis_query_bytes)
 {
-    enum { WAVES = 6 }; /* 26 without deep bounds */
+    enum { WAVES = 3 }; /* 26 without deep bounds, 10 without limit_by_cells */
     static const double p[3] = { 0.05, 0.02, 0.01 };
     counted_source c;
     ebpo_file *far = counted_open(&c, l.packed, true);

@@ -80,8 +80,8 @@ def goals():
         for what, most in ("requests", requests), ("bytes", size):
             yield f"{subject}: {what}", lambda f, s, a=(row, what): f.values(s, *a), most
     yield "levels 0 to 5: requests", lambda f, s: f.values(s, "levels 5", "requests"), 1
-    yield "levels 6 to 8: requests", lambda f, s: f.beyond(s, "requests"), 3
-    yield "levels 6 to 8: bytes", lambda f, s: f.beyond(s, "bytes"), 2.1e6
+    yield "levels 6 to 8, with their checksums: requests", lambda f, s: f.beyond(s, "requests"), 3
+    yield "levels 6 to 8, with their checksums: bytes", lambda f, s: f.beyond(s, "bytes"), 2.1e6
     yield "viewer, first picture: s", lambda f, s: f.viewer(s, "first", "seconds"), 2
     yield "viewer, a click's distance: s", lambda f, s: f.viewer(s, "click", "seconds"), 1.5
     yield "viewer, close-up: bytes", lambda f, s: f.viewer(s, "close", "bytes"), 4e6
@@ -109,12 +109,31 @@ def joined(rows):
     return [[subject, ", ".join(values)] for subject, values in subjects.items()]
 
 
-def goal_table(page, found, note):
+def without_gaps(page, found):
+    """Says what the rays read of a local file."""
+    row = found.row(AFTER, "without gaps")
+    if row:
+        page.text("Requests include gaps between chunks. Without gaps (local file, `--stats`), 100 rays read "
+                  f"{row[0]} subtrees, {figure(row[1] / 1e6)} MB.")
+
+
+def known_in_advance(page, found):
+    """Says what a query would take that knew the needed subtrees."""
+    row = found.row(AFTER, "known")
+    if row:
+        def said(runs):
+            return ", ".join(f"{middle(list(values))} {what}"
+                             for values, what in zip(zip(*runs), ("subtrees", "requests", "bytes")))
+        page.text("Queries that request all needed subtrees together, known in advance (`needed_subtrees`): "
+                  + "; ".join(f"{query} {said(runs)}" for query, runs in row.items()) + ".")
+
+
+def goal_table(page, found):
     page.text("## Goals", "",
               "*Measured* is the median, and the maximum where there are several values; the goal, a limit, "
               "is for the median. All queries are cold: each is a new process without a cache.")
-    if note:
-        page.text(note)
+    without_gaps(page, found)
+    known_in_advance(page, found)
     rows = list(goal_rows(found))
     page.table(["missed or not measured", "measured (goal)"], joined(row for row in rows if row[3] != "yes"))
     page.table(["met", "measured (goal)"], joined(row for row in rows if row[3] == "yes"))
@@ -144,8 +163,8 @@ def middle_only(values):
 
 def query_table(page, found):
     page.text("## Queries by URL", "",
-              "The round trip is 100 ms, also for each new connection. nginx's log has the requests "
-              "and bytes (of bodies). *Round trips* are chains of dependent requests, counted with "
+              "The round trip is 100 ms, also for each new connection. nginx's log has requests "
+              "and bytes. *Round trips* are chains of dependent requests, counted with "
               f"`--http-connections {url_queries.CONNECTIONS}`: the minimum of {url_queries.TRIES} tries. All "
               "else is measured with the default connections.", "",
               f"*Near* points are at most {url_queries.NEAR:g} diagonals from the surface, at positions where "
@@ -179,7 +198,7 @@ def viewer_table(page, found):
 
 def local_table(page, found):
     page.text("## Local file", "",
-              f"The table has results of `ebpo bench --memory {url_queries.BUDGET} --query QUERY`: the first "
+              f"`ebpo bench --memory {url_queries.BUDGET} --query QUERY`: the first "
               "result from a cold file (`--points path --count 1 --seed 1..5`), a path (`--points path "
               "--count 200000 --prefetch`), and uniform points (`--points uniform --count 1000`).")
     table = []
@@ -197,6 +216,7 @@ def local_table(page, found):
 
 def driver_tables(page, found):
     page.text("## HDF5's own readers", "",
+              "h5wasm 0.8 with its zstd plugin; HDF5's ros3 driver through Debian's h5py with our plugin. "
               "Whole files: `ebpo fetch`, all datasets by ros3 and h5wasm; the npm package "
               "reads levels and mesh, no maps. Only the command reads files above 100 MB whole.")
     page.table(["file", "bytes", "reader", "levels 0 to 4: requests", "bytes",
@@ -213,14 +233,13 @@ def driver_tables(page, found):
                 for latency, reader, first, last in found.found.get("drivers/latency", [])])
 
 
-def made(results, command, programs, note):
+def made(results, command, nginx):
     page, found = Page(), Found(results)
     load = results.get("load", {}).values()
     page.text("# Remote files", "", *summary(found))
-    goal_table(page, found, note)
+    goal_table(page, found)
     page.text("## Measurement", "",
-              f"Made by `{command}`; {programs} with its zstd plugin, HDF5's ros3 driver through "
-              f"Debian's h5py with our plugin, all on one machine: {measured.machine()}; load "
+              f"Made by `{command}`; {nginx}, all on one machine: {measured.machine()}; load "
               f"average {figure(statistics.median(load))} (median), {figure(max(load))} (maximum). "
               "Requests and bytes are exact; compare times roughly.", "",
               "Large model: `ebpo-generate --base lucy100k.ply --subdivide 4 lucy28.ply` "

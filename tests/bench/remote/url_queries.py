@@ -1,7 +1,9 @@
 """The queries by URL: the rows that are measured for each side."""
+import array
 import json
 import math
 import random
+import re
 import shutil
 import subprocess
 import time
@@ -164,6 +166,9 @@ def rows(large, small, work, singles, views):
              for eye, at in seen]),
         *(Row(f"levels {to}", f"levels 0 to {to}, types and planes", f"ebpo levels --max-level {to} URL",
               [["levels", "--max-level", to, "URL"]]) for to in (5, 8)),
+        Row("info", "`info`", "ebpo info URL", [["info", "URL"]], least_round_trips=False),
+        Row("extract", "`extract --mesh`", "ebpo extract --mesh URL OUT", [["extract", "--mesh", "URL", "OUT.ply"]],
+            least_round_trips=False),
         Row("no budget", "one inside, without `--memory`", "ebpo inside URL POINT",
             points("inside", each[:1]), least_round_trips=False)]
     return {row.name: row for row in table}
@@ -175,11 +180,12 @@ def run_row(server, line, side, row, work, connections=None):
     out, found = work / "out.ebpo.h5", {"requests": [], "bytes": [], "seconds": [], "least_round_trips": []}
     name = side.link(row.which)
     for command in row.arguments:
-        words = {"URL": f"http://127.0.0.1:{line.port}/{name}", "OUT": out}
+        words = {"URL": f"http://127.0.0.1:{line.port}/{name}", "OUT": out, "OUT.ply": out.with_suffix(".ply")}
         command = [str(words.get(word, word)) for word in command]
         if connections:
             command[1:1] = ["--http-connections", str(connections)]
         out.unlink(missing_ok=True)
+        out.with_suffix(".ply").unlink(missing_ok=True)
         shutil.rmtree(f"{out}.part", ignore_errors=True)
         server.traffic(name)
         line.requests = []
@@ -219,6 +225,32 @@ def local(side, file, seeds, count):
                       for seed in range(1, seeds + 1)],
             "path": bench("--query", query, "--points", "path", "--count", count, "--prefetch"),
             "uniform": bench("--query", query, "--points", "uniform", "--count", count // 200)}
+    return found
+
+
+def without_gaps(side, work):
+    """Return the number of subtrees and the bytes that the 100 rays read of the local small model: no gaps between
+    chunks. `rows` wrote the rays."""
+    said = subprocess.run([side.ebpo, "ray", "--stats", "--memory", BUDGET, side.files["small"], work / "rays_100.txt"],
+                          check=True, capture_output=True, text=True).stderr
+    return [int(re.search(rf"\b{what} (\d+)", said)[1]) for what in ("loads", "bytes_read")]
+
+
+def known_in_advance(server, side, work):
+    """Return {query: [(needed subtrees, requests, bytes) of each command]} for queries of the small model that know all
+    needed subtrees in advance and request them together. `rows` wrote the points."""
+    name, points, found = side.link("small"), work / "points.bin", {}
+    subprocess.run(["ninja", "-C", side.build, "tests/bench/needed_subtrees"], check=True, capture_output=True)
+    for query, files in (("one distance deep inside", sorted(work.glob("deep_*.txt"))),
+                         ("50 near points", [work / "near_50.txt"])):
+        for file in files:
+            points.write_bytes(array.array("d", map(float, file.read_text().split())).tobytes())
+            server.traffic(name)
+            said = subprocess.run([side.build / "tests/bench/needed_subtrees", side.files["small"], points, "256000000",
+                                   f"http://127.0.0.1:{server.port}/{name}"],
+                                  check=True, capture_output=True, text=True).stdout
+            count = int(re.search(r"requested: (\d+)", said)[1])
+            found.setdefault(query, []).append((count, *server.traffic(name)))
     return found
 
 
