@@ -288,6 +288,8 @@ ebpo_status ebpo_emit_piece(const ebpo_builder *b, ebpo_emit_scratch *scratch, e
 
 /* --- joining the stretches --- */
 
+enum { JOIN_GRAIN = 64 }; /* number of stretches of a parallel task */
+
 typedef struct joiner {
     ebpo_builder *b;
     /* [count][EBPO_LEVELS_MAX] stretches of pieces and of the top, depth first */
@@ -296,7 +298,10 @@ typedef struct joiner {
     ebpo_piece_level *current; /* stretches of the top, if they are the last ones so far; NULL: the
                                 * last ones are those of a piece */
     ebpo_level *level;         /* [EBPO_LEVELS_MAX] result */
-    uint32_t next;             /* final index of the next new face */
+    bool has[EBPO_LEVELS_MAX][EBPO_LEVEL_ARRAYS]; /* true: a stretch has this array */
+    /* [block of JOIN_GRAIN stretches][level][unit] counts of the blocks before */
+    uint64_t (*first)[EBPO_LEVELS_MAX][EBPO_PER_GROUP + 1];
+    uint32_t next; /* final index of the next new face */
 } joiner;
 
 static const char stage[] = "joining levels";
@@ -382,22 +387,43 @@ static bool collect_stretches(joiner *j, uint32_t index, ebpo_node_type type, eb
     return true;
 }
 
-/* Sets one count of the joined level: its number of leaves, of gray nodes, or of another ebpo_per.
- */
-static void add_counts(const joiner *j, int level, int unit)
+/* Adds the counts and volumes of all stretches to the joined levels, in the order of the stretches,
+ * and sets j->first and j->has. */
+static void add_up_stretches(joiner *j)
 {
-    uint64_t total = 0;
-    for (uint64_t i = 0; i < j->count; i++)
-        total += ebpo_level_count(&j->stretch[i][level].level, (ebpo_per)unit);
-    ebpo_level_set_count(&j->level[level], (ebpo_per)unit, total);
+    EBPO_FOR_ITEMS_EVERY(j->b->workspace, JOIN_GRAIN, i, 0, j->count)
+        for (int level = 0; level < EBPO_LEVELS_MAX; level++) {
+            const ebpo_level *from = &j->stretch[i][level].level;
+            ebpo_level *out = &j->level[level];
+            for (int unit = 0; unit <= EBPO_PER_GROUP; unit++) {
+                uint64_t before = ebpo_level_count(out, (ebpo_per)unit);
+                if (i % JOIN_GRAIN == 0)
+                    j->first[i / JOIN_GRAIN][level][unit] = before;
+                ebpo_level_set_count(out, (ebpo_per)unit,
+                                     before + ebpo_level_count(from, (ebpo_per)unit));
+            }
+            for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++)
+                j->has[level][id] |= ebpo_schema_is_held(id) && ebpo_level_array(from, id);
+            out->gray_volume += from->gray_volume;
+            out->leaf_volume += from->leaf_volume;
+        }
 }
 
-static bool any_has(const joiner *j, int level, int id)
+/* Allocates the arrays of the joined levels; omits arrays that no stretch has. Returns false when
+ * out of memory. */
+static bool alloc_levels(joiner *j)
 {
-    for (uint64_t i = 0; i < j->count; i++)
-        if (ebpo_level_array(&j->stretch[i][level].level, id))
-            return true;
-    return false;
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+        for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+            uint64_t rows = j->has[level][id] ? ebpo_level_rows(&j->level[level], id) : 0;
+            void *array =
+                rows ? ebpo_array_alloc(j->b->workspace, rows, ebpo_schema[id].held_size) : NULL;
+            if (rows && !array)
+                return false;
+            if (rows)
+                ebpo_level_set_array(&j->level[level], id, array);
+        }
+    return true;
 }
 
 /* Fills a part of an array with the array's default value. */
@@ -409,31 +435,48 @@ static void fill_default(const joiner *j, char *to, uint64_t bytes, int id)
         memcpy(to + i * ebpo_schema[id].held_size, &value, ebpo_schema[id].held_size);
 }
 
-/* Joins an array of a level; omits an array that no stretch has. Returns false when out of memory.
- */
-static bool join_array(const joiner *j, int level, int id, ebpo_level *out)
+/* Moves the arrays of a stretch of a level to the joined level. at[unit]: the stretch's first row
+ * in the arrays with one row for each `unit`; this function adds the stretch's counts. */
+static void join_stretch(const joiner *j, ebpo_piece_level *stretch, const ebpo_level *out,
+                         uint64_t at[EBPO_PER_GROUP + 1])
 {
-    uint64_t total = ebpo_level_rows(out, id), size = ebpo_schema[id].held_size;
-    if (!total || !any_has(j, level, id))
-        return true;
-    char *to = ebpo_array_alloc(j->b->workspace, total, size);
-    if (!to)
-        return false;
-    ebpo_level_set_array(out, id, to);
-    EBPO_FOR_ITEMS_EVERY(j->b->workspace, 1, i, 0, j->count) {
-        ebpo_level *from = &j->stretch[i][level].level;
+    ebpo_level *from = &stretch->level;
+    for (int id = 0; id < EBPO_LEVEL_ARRAYS; id++) {
+        if (!ebpo_schema_is_held(id))
+            continue;
         void *array = ebpo_level_array(from, id);
-        size_t bytes = (size_t)(ebpo_level_rows(from, id) * size);
-        if (array)
+        char *to = ebpo_level_array(out, id);
+        uint64_t size = ebpo_schema[id].held_size, bytes = ebpo_level_rows(from, id) * size;
+        if (to)
+            to += at[ebpo_schema[id].per] * size;
+        if (to && array)
             ebpo_array_copy(j->b->workspace, to, array, bytes);
-        else /* a stretch in which all elements have the default value */
+        else if (to) /* a stretch in which all elements have the default value */
             fill_default(j, to, bytes, id);
-        to += bytes;
-        if (!j->stretch[i][level].packed)
+        if (!stretch->packed)
             ebpo_array_free(j->b->workspace, array);
         ebpo_level_set_array(from, id, NULL);
     }
-    return true;
+    for (int unit = 0; unit <= EBPO_PER_GROUP; unit++)
+        at[unit] += ebpo_level_count(from, (ebpo_per)unit);
+}
+
+/* Joins stretches begin .. end - 1 of all levels, and frees them. One pass over the stretches is
+ * enough: they may be in files, and each pass would read these files again. */
+static ebpo_status join_stretches(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                  ebpo_error *error)
+{
+    joiner *j = context;
+    uint64_t at[EBPO_LEVELS_MAX][EBPO_PER_GROUP + 1];
+    (void)worker, (void)error;
+    memcpy(at, j->first[begin / JOIN_GRAIN], sizeof at);
+    EBPO_FOR_ITEMS_EVERY(j->b->workspace, 1, i, begin, end) {
+        for (int level = 0; level < EBPO_LEVELS_MAX; level++)
+            join_stretch(j, &j->stretch[i][level], &j->level[level], at[level]);
+        ebpo_piece_levels_free(j->stretch[i]);
+        j->stretch[i] = NULL;
+    }
+    return EBPO_OK;
 }
 
 static int compare_indices(const void *a, const void *b)
@@ -526,32 +569,12 @@ static void omit_arrays(const ebpo_builder *b, ebpo_level *l)
         l->ref_count = l->new_count = 0;
 }
 
-/* Joins arrays: task i joins array i % EBPO_LEVEL_ARRAYS of level i / EBPO_LEVEL_ARRAYS. */
-static ebpo_status join_arrays(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                               ebpo_error *error)
-{
-    joiner *j = context;
-    (void)worker;
-    for (uint64_t i = begin; i < end; i++) {
-        int level = (int)(i / EBPO_LEVEL_ARRAYS), id = (int)(i % EBPO_LEVEL_ARRAYS);
-        if (ebpo_schema_is_held(id) && !join_array(j, level, id, &j->level[level]))
-            return no_memory(j->b, error);
-    }
-    return EBPO_OK;
-}
-
-/* Adds up the volumes of a level, in a fixed order that does not depend on the number of threads.
- * Then replaces the references by final indices, and omits arrays. `before`, `all`: as for
+/* Replaces the references of a level by final indices, and omits arrays. `before`, `all`: as for
  * number_refs. */
 static ebpo_status finish_level(const joiner *j, int level, uint64_t before, uint64_t all,
                                 ebpo_error *error)
 {
     ebpo_level *out = &j->level[level];
-    for (uint64_t i = 0; i < j->count; i++) {
-        const ebpo_level *l = &j->stretch[i][level].level;
-        out->gray_volume += l->gray_volume;
-        out->leaf_volume += l->leaf_volume;
-    }
     ebpo_status status = j->b->options->parts & EBPO_PART_MESH
                              ? number_refs(j->b, out, before, all, error)
                              : EBPO_OK;
@@ -577,17 +600,19 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
         root_group(&j) && collect_stretches(&j, 0, b->top.nodes[0].type, b->top.cell, 0, 0)
             ? EBPO_OK
             : no_memory(b, error);
-    uint64_t refs = 0, all = 0;
-    for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
-        for (int unit = 0; unit <= EBPO_PER_GROUP; unit++)
-            add_counts(&j, level, unit);
+    uint64_t blocks = j.count / JOIN_GRAIN + 1, refs = 0, all = 0;
+    j.first = status == EBPO_OK ? ebpo_array_alloc(b->workspace, blocks, sizeof *j.first) : NULL;
+    if (j.first)
+        add_up_stretches(&j);
+    if (status == EBPO_OK && (!j.first || !alloc_levels(&j)))
+        status = no_memory(b, error);
+    for (int level = 0; level < EBPO_LEVELS_MAX; level++)
         all += out->level[level].ref_count;
-    }
     ebpo_pass pass = { &b->options->progress, 0, all, 2 * all };
     ebpo_progress progress = ebpo_pass_progress(&pass);
     if (status == EBPO_OK)
-        status = ebpo_parallel_for(b->threads, NULL, EBPO_LEVELS_MAX * EBPO_LEVEL_ARRAYS, 1,
-                                   join_arrays, &j, &progress, stage, error);
+        status = ebpo_parallel_for(b->threads, NULL, j.count, JOIN_GRAIN, join_stretches, &j,
+                                   &progress, stage, error);
     for (int level = 0; level < EBPO_LEVELS_MAX && status == EBPO_OK; level++) {
         uint64_t refs_of_level = out->level[level].ref_count;
         status = finish_level(&j, level, refs, all, error);
@@ -599,6 +624,7 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
     for (uint64_t i = 0; i < j.count; i++)
         ebpo_piece_levels_free(j.stretch[i]);
     free(j.stretch);
+    ebpo_array_free(b->workspace, j.first);
     ebpo_store_free(b->store);
     b->store = NULL;
     return status;

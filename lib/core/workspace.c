@@ -15,6 +15,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#ifdef EBPO_HAVE_RUSAGE_THREAD
+#include <sys/resource.h>
+#endif
 #include <unistd.h>
 
 #include <ebpo/workspace.h>
@@ -56,10 +59,10 @@ struct ebpo_workspace {
     _Atomic int failed; /* reason of the last failure: errno for a file; 0: out of memory */
     int statm;          /* descriptor of /proc/self/statm; -1: the system does not have this file */
     /* bytes of files, including libraries, that stay resident after pages are released */
-    uint64_t floor;
+    _Atomic uint64_t floor;
     size_t page;                     /* size of the system's pages */
     char folder[EBPO_FOLDER_BYTES];  /* folder of the temporary files */
-    pthread_mutex_t table_lock;      /* protects `table`, `floor` */
+    pthread_mutex_t table_lock;      /* protects `table`; writers of `floor` hold it */
     extent *table[1 << BUCKET_BITS]; /* extents by address; there are thousands at most */
 };
 
@@ -401,12 +404,13 @@ static void leave_pool(ebpo_workspace *w, extent *pool)
     unmap_extent(w, pool);
 }
 
-/* Gives a part's memory, or its space in the file, back to the system, if the system allows this.
- */
+/* Gives the memory of a part back to the system. The space of a part in a file remains until the
+ * pool is freed, because the system waits for the disk when it makes a hole in a file. */
 static void discard_pages(const extent *b)
 {
-#ifdef EBPO_HAVE_MADV_REMOVE
-    madvise(b->at, b->bytes, b->filed ? MADV_REMOVE : MADV_DONTNEED);
+#ifdef EBPO_HAVE_MADVISE
+    if (!b->filed)
+        madvise(b->at, b->bytes, MADV_DONTNEED);
 #else
     (void)b;
 #endif
@@ -523,15 +527,44 @@ static void release_extent(const extent *b)
 #endif
 }
 
+/* Returns true if so many pages are resident that their release is worthwhile. */
+static bool should_release(const ebpo_workspace *w)
+{
+    residency current = read_residency(w);
+    return current.all > w->usage.memory / 4 * 3 &&
+           current.files >= w->floor + w->usage.memory / 16;
+}
+
+/* Returns false if this thread has had fewer than FAULTS_MIN page faults since the function last
+ * returned true to it for this workspace. A fault brings at most 64 KiB of a file into memory. The
+ * system counts faults in a third of the time that statm takes. */
+static bool has_faulted(const ebpo_workspace *w)
+{
+#ifdef EBPO_HAVE_RUSAGE_THREAD
+    enum { FAULTS_MIN = 8 };
+    static _Thread_local const ebpo_workspace *last;
+    static _Thread_local long faults;
+    struct rusage usage;
+    if (getrusage(RUSAGE_THREAD, &usage) == 0) {
+        long now = usage.ru_minflt + usage.ru_majflt;
+        if (last == w && now - faults < FAULTS_MIN)
+            return false;
+        last = w;
+        faults = now;
+    }
+#else
+    (void)w;
+#endif
+    return true;
+}
+
 void ebpo_release_pages(ebpo_workspace *workspace)
 {
     ebpo_workspace *w = workspace;
-    if (!w || read_residency(w).all <= w->usage.memory / 4 * 3)
+    if (!w || !has_faulted(w) || !should_release(w))
         return;
     pthread_mutex_lock(&w->table_lock);
-    residency current = read_residency(w); /* another thread may have released pages meanwhile */
-    /* releases nothing if this would free few pages */
-    if (current.all <= w->usage.memory / 4 * 3 || current.files < w->floor + w->usage.memory / 16) {
+    if (!should_release(w)) { /* another thread has released pages meanwhile */
         pthread_mutex_unlock(&w->table_lock);
         return;
     }

@@ -187,6 +187,53 @@ START_TEST(test_workspace_loops_release_pages)
 }
 END_TEST
 
+/* Returns the number of system calls by which this process has read files; 0 if it is not known. */
+static long long calls_of_read(void)
+{
+    char line[64];
+    long long calls = 0;
+    FILE *f = fopen("/proc/self/io", "r");
+    while (f && fgets(line, sizeof line, f))
+        if (strncmp(line, "syscr:", 6) == 0)
+            calls = atoll(line + 6);
+    if (f)
+        fclose(f);
+    return calls;
+}
+
+/* Loops call ebpo_release_pages for each few items, so a thread reads its resident memory only
+ * after page faults. */
+START_TEST(test_workspace_reads_memory_only_after_faults)
+{
+    ebpo_workspace *w = make(1 << 20);
+    ebpo_release_pages(w);
+    long long before = calls_of_read();
+    for (int i = 0; i < 10000; i++)
+        ebpo_release_pages(w);
+    ck_assert_int_lt(calls_of_read() - before, 100);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
+/* The bytes of a freed part remain in the file of its pool until the pool is freed: the system
+ * waits for the disk when it makes a hole in a file. `b` keeps the pool mapped. */
+START_TEST(test_workspace_makes_no_holes_in_files)
+{
+    ebpo_workspace *w = make(1 << 20);
+    char *a = ebpo_array_alloc(w, 8192, 1), *b = ebpo_array_alloc(w, 8192, 1);
+    ebpo_workspace_stats f = EBPO_WORKSPACE_STATS_INIT;
+    ck_assert(a && b);
+    ebpo_workspace_get_stats(w, &f);
+    ck_assert_uint_gt(f.filed, 0);
+    memset(a, 7, 8192);
+    volatile const char *freed = a;
+    ebpo_array_free(w, a);
+    ck_assert_int_eq(freed[8191], 7);
+    ebpo_array_free(w, b);
+    ebpo_workspace_free(w);
+}
+END_TEST
+
 START_TEST(test_workspace_null_uses_malloc)
 {
     char *a = ebpo_array_alloc(NULL, 10 << 20, 1);
@@ -255,6 +302,10 @@ TEST_SUITE(workspace)
         tcase_add_test(tests, test_workspace_releases_file_pages);
         tcase_add_loop_test(tests, test_workspace_loops_release_pages, 0, 4);
     }
+#ifdef EBPO_HAVE_RUSAGE_THREAD
+    tcase_add_test(tests, test_workspace_reads_memory_only_after_faults);
+#endif
+    tcase_add_test(tests, test_workspace_makes_no_holes_in_files);
     tcase_add_test(tests, test_workspace_null_uses_malloc);
     tcase_add_test(tests, test_workspace_invalid_options_are_refused);
     tcase_add_test(tests, test_workspace_write_failure_names_folder);
