@@ -251,11 +251,12 @@ static residency read_residency(const ebpo_workspace *w)
 static bool choose_and_count(ebpo_workspace *w, size_t bytes)
 {
     ebpo_workspace_stats *f = &w->usage;
-    residency now = read_residency(w);
     pthread_mutex_lock(&w->lock);
-    bool filed =
-        f->held + bytes > f->memory / 2 ||
-        (f->held + bytes > f->memory / 4 && now.all - now.files + bytes > f->memory / 8 * 5);
+    bool filed = f->held + bytes > f->memory / 2;
+    if (!filed && f->held + bytes > f->memory / 4) {
+        residency now = read_residency(w);
+        filed = now.all - now.files + bytes > f->memory / 8 * 5;
+    }
     if (filed) {
         f->filed += bytes;
         f->filed_total += bytes;
