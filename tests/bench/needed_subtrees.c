@@ -9,7 +9,9 @@
  * A subtree is needed if no envelope of the file shows that all of its faces are farther than the
  * nearest face. For each level, prints the number of subtrees that remain when the envelopes down
  * to this level are known; then the subtrees that the queries searched and loaded. All values are
- * means over the points. With URL, prints the number of requested subtrees. */
+ * means over the points. *different* is the number of different subtrees, divided by the number of
+ * points: a method that keeps every subtree in memory, but knows only the envelopes, loads this
+ * many subtrees for each point. With URL, prints the number of requested subtrees. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -56,16 +58,21 @@ typedef struct walk {
     int cut_level;
     double limit;                 /* distance of the nearest face */
     uint64_t near;                /* number of subtrees that are not farther */
-    const ebpo_node_table *nodes; /* of the model */
-    bool *needed; /* [subtrees of the model] is set for those that are not farther */
+    const ebpo_node_table *nodes; /* of the model's top */
+    bool *needed; /* [subtrees of the model] the subtree was not farther than the nearest face of a
+                   * point */
+    uint64_t different; /* number of such subtrees */
 } walk;
 
-/* Sets w->needed for the subtree that has this cell. */
-static void mark(walk *w, ebpo_cell cell)
+/* Marks the subtree whose root has a cell. */
+static void mark_subtree(walk *w, ebpo_cell cell)
 {
-    uint32_t entry = ebpo_descend(w->nodes, cell.level, cell.at).entry;
-    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_SUBTREE_ROOT)
-        w->needed[ebpo_entry_value(entry)] = true;
+    uint32_t entry = w->nodes->root;
+    for (int level = 0; level < cell.level; level++)
+        entry = ebpo_table_child(w->nodes, entry, ebpo_cell_octant(cell, level));
+    bool *needed = &w->needed[ebpo_entry_value(entry)];
+    w->different += !*needed;
+    *needed = true;
 }
 
 /* Returns true if a node that is not farther than the limit has a leaf or a node of the deepest
@@ -87,7 +94,7 @@ static bool is_near(walk *w, uint32_t entry, ebpo_cell cell)
     if (near &&
         (cell.level == w->cut_level || (cell.level < w->cut_level && kind != EBPO_ENTRY_GRAY))) {
         w->near++;
-        mark(w, cell);
+        mark_subtree(w, cell);
     }
     return near;
 }
@@ -144,7 +151,11 @@ int main(int argc, char **argv)
         distance[i] = fabs(result.distance);
     }
     bool *needed = calloc(m->top->below_count, sizeof *needed);
-    for (int level = m->top->cut_level; needed && level < m->info->level_count; level++) {
+    if (!needed) {
+        perror("needed_subtrees");
+        return EXIT_FAILURE;
+    }
+    for (int level = m->top->cut_level; level < m->info->level_count; level++) {
         memset(needed, false, m->top->below_count * sizeof *needed);
         walk w = { .cut_level = m->top->cut_level, .nodes = &m->top->nodes, .needed = needed };
         ebpo_top *top;
@@ -155,12 +166,13 @@ int main(int argc, char **argv)
             w.limit = distance[i];
             is_near(&w, top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
         }
-        printf("level %d: %.2f subtrees\n", level, (double)w.near / (double)count);
+        printf("level %d: %.2f subtrees, different: %.2f\n", level, (double)w.near / (double)count,
+               (double)w.different / (double)count);
         ebpo_top_free(top);
     }
     printf("searched: %.2f, loaded: %.2f\n", (double)c->searched / (double)count,
            (double)c->loaded / (double)count);
-    if (argc == 5 && needed)
+    if (argc == 5)
         request_all(argv[4], &how, needed);
     ebpo_context_free(c);
     ebpo_model_free(m);
