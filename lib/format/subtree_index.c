@@ -853,12 +853,13 @@ void ebpo_subtrees_hint(ebpo_chunks *chunks, ebpo_hints *hints, uint64_t first, 
 {
     const ebpo_info *info = &chunks->file->info;
     bool mesh = faces && info->parts & EBPO_PART_MESH, single = count == 1;
+    if (!count || !ebpo_hints_wanted(hints))
+        return;
     ebpo_subtree_row *row = ebpo_alloc(3, sizeof *row);
     hinting t = { chunks,  hints,
                   &row[0], single ? &row[0] : &row[1],
                   needs,   faces ? EBPO_LEVELS_MAX : last_level };
-    if (row && count && ebpo_hints_wanted(hints) &&
-        ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
+    if (row && ebpo_subtree_table_row(chunks, first, &row[0], NULL) == EBPO_OK &&
         (single || ebpo_subtree_table_row(chunks, first + count - 1, &row[1], NULL) == EBPO_OK)) {
         hint_nodes(&t);
         if (mesh)

@@ -113,14 +113,22 @@ void ebpo_skeleton_grow(ebpo_skeleton *skeleton, const ebpo_accel *subtree, cons
 typedef struct ebpo_faces_box {
     double low[3], high[3];
 } ebpo_faces_box;
-/* Writes boxes that together contain all faces of the subtree; returns their number. */
-unsigned ebpo_skeleton_boxes(const ebpo_skeleton *skeleton, ebpo_faces_box out[8]);
 /* Maximum number of boxes of a skeleton. */
 enum { EBPO_SHARED_BOXES = 64 };
 /* Writes boxes that contain all shared faces that may be within `limit` of p; returns the number of
  * boxes. */
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *skeleton, const double p[3], double limit,
                                     ebpo_faces_box out[EBPO_SHARED_BOXES]);
+
+/* The nodes of a skeleton as an accel without faces. A child whose node the skeleton does not have
+ * is block 0. Set are only the members that walks over pairs of nodes read: the frame, the boxes
+ * and cylinders, and the hierarchy. */
+typedef struct ebpo_skeleton_accel {
+    ebpo_accel accel;
+    ebpo_bound bound[EBPO_SKELETON_NODES];
+    ebpo_bound_cylinder cylinder[EBPO_SKELETON_NODES];
+} ebpo_skeleton_accel;
+void ebpo_skeleton_copy(const ebpo_skeleton *skeleton, ebpo_skeleton_accel *out);
 
 /* The skeletons of a model's subtrees. `number`: index of a subtree in top->below. Any thread may
  * use the skeletons. */

@@ -18,6 +18,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -415,20 +416,50 @@ static unsigned boxes_of(const ebpo_skeleton *k, uint32_t index, unsigned lanes,
     return count;
 }
 
-unsigned ebpo_skeleton_boxes(const ebpo_skeleton *k, ebpo_faces_box out[8])
-{
-    const ebpo_bound *top = &node_at(k, 0)->bound;
-    for (int lane = 0; lane < top->count; lane++)
-        out[lane] = box_of(k, top, lane);
-    return top->count;
-}
-
 unsigned ebpo_skeleton_shared_boxes(const ebpo_skeleton *k, const double point[3], double limit,
                                     ebpo_faces_box out[EBPO_SHARED_BOXES])
 {
     double p[3];
     bool near = to_frame(k, point, p);
     return boxes_of(k, 0, k->shared, p, near ? frame_limit2(k, limit) : INFINITY, out);
+}
+
+/* --- a copy for walks --- */
+
+/* Copies a node without its children, which another thread may be changing. */
+static void copy_node(const kept_node *from, ebpo_bound *bound, ebpo_bound_cylinder *cylinder)
+{
+    const size_t child = offsetof(ebpo_bound, child), after = child + sizeof bound->child;
+    memcpy(bound, &from->bound, child);
+    memcpy((char *)bound + after, (const char *)&from->bound + after, sizeof *bound - after);
+    *cylinder = from->cylinder;
+}
+
+void ebpo_skeleton_copy(const ebpo_skeleton *k, ebpo_skeleton_accel *out)
+{
+    uint32_t index[EBPO_SKELETON_NODES] = { 0 },
+             count = 1; /* index: of the nodes in the skeleton */
+    double largest = 1;
+    for (uint32_t i = 0; i < count; i++) {
+        const kept_node *n = node_at(k, index[i]);
+        ebpo_bound *bound = &out->bound[i];
+        copy_node(n, bound, &out->cylinder[i]);
+        for (int lane = 0; lane < bound->count; lane++) {
+            uint32_t child = child_of(n, lane);
+            if (is_kept(child))
+                index[count] = child & ~IS_KEPT;
+            bound->child[lane] = is_kept(child) ? count++ : EBPO_IS_BLOCK;
+        }
+    }
+    for (int i = 0; i < 3; i++)
+        largest = fmax(largest,
+                       fabs((double)out->bound[0].origin[i]) + 255 * (double)out->bound[0].step[i]);
+    out->accel = (ebpo_accel){ .scale = k->scale,
+                               .largest_coordinate = largest,
+                               .bound = out->bound,
+                               .cylinder = out->cylinder,
+                               .bound_count = count };
+    memcpy(out->accel.centre, k->centre, sizeof k->centre);
 }
 
 /* --- the skeletons of a model --- */

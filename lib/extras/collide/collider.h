@@ -25,7 +25,10 @@ struct ebpo_collider {
     unsigned walk_count;
     uint64_t node_pairs, block_pairs, exact; /* as in ebpo_collider_stats */
     uint64_t subtree_pairs, subtrees, loads,
-        bytes_read;                /* as in ebpo_collider_stats; only for partly loaded models */
+        bytes_read; /* as in ebpo_collider_stats; only for partly loaded models */
+    bool backward;  /* the next query for all pairs of partly loaded models visits the pairs of
+                     * subtrees in the reverse order, because the last subtrees of the previous query
+                     * are still in memory */
     struct ebpo_gap_search *gap;   /* state of distance queries; NULL before the first query */
     struct ebpo_face_two *nearest; /* nearest pair of the last distance query, in the caller's
                                     * order of the models; NULL: no query has found a pair */

@@ -107,10 +107,13 @@ typedef struct posed_hull {
 
 /* Number of levels whose planes cut an envelope. This number is limited, because the rounding
  * errors of corners grow from level to level. */
-enum { LEVELS_OF_PLANES = 8 };
+enum { LEVELS_OF_PLANES = 10 };
 /* Bound of the error of an envelope, as a share of the cell's side. Each level has at most 255
  * planes, and the error of each plane is at most 1e-10 of the level's cell. */
 static const double cut_share = 0x1p-15;
+
+/* Number of envelopes of nodes below the roots of subtrees that are kept. */
+enum { DEEP_HULLS = 1 << 10 };
 
 /* --- order of subtrees --- */
 
@@ -162,7 +165,11 @@ void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
 {
     for (uint64_t i = 0; i < s->slots; i++)
         free(s->hull[i]);
+    for (int i = 0; s->deep_hull && i < DEEP_HULLS; i++)
+        free(s->deep_hull[i]);
     free(s->hull);
+    free(s->deep_hull);
+    s->deep_hull = NULL;
     free(s->rank);
     free(s->chain);
     s->hull = NULL;
@@ -222,36 +229,6 @@ void ebpo_posed_ends(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[3]
         out[k] = end[0][k] + end[1][k];
 }
 
-/* Sets *out to the box around a posed box. */
-static void pose_box(const ebpo_posing *p, const ebpo_faces_box *box, ebpo_faces_box *out)
-{
-    double middle[3], half[3], posed[3];
-    for (int k = 0; k < 3; k++) {
-        middle[k] = box->low[k] + (box->high[k] - box->low[k]) / 2;
-        half[k] = (box->high[k] - box->low[k]) / 2;
-    }
-    ebpo_posing_apply(p, middle, posed);
-    for (int i = 0; i < 3; i++) {
-        double reach = 0;
-        for (int k = 0; k < 3; k++)
-            reach += fabs(p->matrix[i][k]) * half[k];
-        out->low[i] = posed[i] - reach;
-        out->high[i] = posed[i] + reach;
-    }
-}
-
-unsigned ebpo_posed_face_boxes(const ebpo_posed_subtrees *s, uint32_t number, ebpo_faces_box out[8])
-{
-    const ebpo_skeleton *skeleton =
-        s->model->skeletons ? ebpo_skeletons_find(s->model->skeletons, number) : NULL;
-    unsigned count = skeleton ? ebpo_skeleton_boxes(skeleton, out) : 0;
-    for (unsigned i = 0; i < count; i++) {
-        ebpo_faces_box box = out[i];
-        pose_box(&s->posing, &box, &out[i]);
-    }
-    return count;
-}
-
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate)
 {
     double side = 0;
@@ -275,14 +252,44 @@ double ebpo_posed_shortest_side(const ebpo_posed_subtrees *s, ebpo_cell cell)
 
 /* --- envelopes --- */
 
-/* Cuts an envelope by the planes of a node. */
-static void cut_node(const ebpo_posed_subtrees *s, const ebpo_posed_node *node,
-                     ebpo_polytope *envelope)
+/* Returns the nodes of a partly loaded model whose envelopes are in memory: the deep bounds, which
+ * have some levels below the roots of subtrees, or the top. */
+static const ebpo_top *known_nodes(const ebpo_posed_subtrees *s)
 {
-    uint32_t count = 0;
-    ebpo_node stored = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
-    stored.subtree = s->model->whole;
-    const uint32_t *codes = ebpo_model_planes(s->model, &stored, &count);
+    const ebpo_top *deep = atomic_load_explicit(&s->model->deep, memory_order_acquire);
+    return deep ? deep : s->model->top;
+}
+
+/* Returns a child of a gray node of `known`; NULL: of the whole model. A node of `known` that is
+ * not gray has uniform children. */
+static ebpo_posed_node known_child(const ebpo_posed_subtrees *s, const ebpo_top *known,
+                                   const ebpo_posed_node *gray, unsigned octant)
+{
+    if (!known)
+        return ebpo_posed_child(s, gray, octant);
+    uint32_t entry = ebpo_entry_kind_of(gray->entry) == EBPO_ENTRY_GRAY
+                         ? ebpo_table_child(&known->nodes, gray->entry, octant)
+                         : ebpo_entry(EBPO_ENTRY_UNIFORM, EBPO_ENTRY_ZERO);
+    return (ebpo_posed_node){ entry, ebpo_cell_child(gray->cell, octant) };
+}
+
+/* Cuts an envelope by the planes of a node of `known`; NULL: of the whole model. */
+static void cut_node(const ebpo_posed_subtrees *s, const ebpo_top *known,
+                     const ebpo_posed_node *node, ebpo_polytope *envelope)
+{
+    uint32_t count = 0, value = ebpo_entry_value(node->entry);
+    const uint32_t *codes = NULL;
+    if (known && ebpo_entry_kind_of(node->entry) != EBPO_ENTRY_UNIFORM) {
+        ebpo_top_planes planes = ebpo_entry_kind_of(node->entry) == EBPO_ENTRY_GRAY
+                                     ? known->gray[value]
+                                     : known->below_planes[value];
+        codes = known->planes + planes.first;
+        count = planes.count;
+    } else if (!known) {
+        ebpo_node stored = ebpo_entry_node(node->entry, node->cell, s->model->info->rule);
+        stored.subtree = s->model->whole;
+        codes = ebpo_model_planes(s->model, &stored, &count);
+    }
     ebpo_planes_cut(envelope, codes, count);
 }
 
@@ -298,7 +305,10 @@ typedef struct envelope_chain {
 static const ebpo_polytope *cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
     envelope_chain *c = s->chain;
+    const ebpo_top *known = s->model->whole ? NULL : known_nodes(s);
     ebpo_posed_node node = ebpo_posed_root(s);
+    if (known)
+        node.entry = known->nodes.root;
     ebpo_octcode last = ebpo_octcode_of_cell(cell);
     int first = cell.level < LEVELS_OF_PLANES ? 0 : cell.level - LEVELS_OF_PLANES + 1;
     for (int level = 0;; level++) {
@@ -309,12 +319,12 @@ static const ebpo_polytope *cut_envelope(const ebpo_posed_subtrees *s, ebpo_cell
                 ebpo_polytope_cube(&c->at[0]);
             else /* if this fails, the envelope is a box around the content */
                 (void)ebpo_polytope_child(&c->at[i - 1], (unsigned)(code & 7), &c->at[i]);
-            cut_node(s, &node, &c->at[i]);
+            cut_node(s, known, &node, &c->at[i]);
             c->code[i] = code;
         }
         if (level == cell.level)
             return &c->at[i];
-        node = ebpo_posed_child(s, &node, ebpo_cell_octant(cell, level));
+        node = known_child(s, known, &node, ebpo_cell_octant(cell, level));
     }
 }
 
@@ -383,6 +393,42 @@ ebpo_status ebpo_posed_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_con
         s->hulls++;
         s->bytes += sizeof **hull + (uint64_t)(*hull)->count * sizeof *(*hull)->point;
     }
+    *out = (ebpo_convex){ (*hull)->count, (const double(*)[3])(*hull)->point };
+    return EBPO_OK;
+}
+
+/* --- below the roots of subtrees --- */
+
+ebpo_posed_node ebpo_posed_deep_node(const ebpo_posed_subtrees *s, ebpo_cell cell)
+{
+    const ebpo_top *known = known_nodes(s);
+    ebpo_posed_node node = { known->nodes.root, { 0, { 0, 0, 0 } } };
+    for (int level = 0; level < cell.level; level++)
+        node = known_child(s, known, &node, ebpo_cell_octant(cell, level));
+    return node;
+}
+
+ebpo_posed_node ebpo_posed_deep_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
+                                      unsigned octant)
+{
+    return known_child(s, known_nodes(s), gray, octant);
+}
+
+ebpo_status ebpo_posed_deep_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebpo_convex *out,
+                                     ebpo_error *error)
+{
+    ebpo_octcode code = ebpo_octcode_of_cell(cell);
+    if (!s->deep_hull)
+        s->deep_hull = ebpo_alloc_zero(DEEP_HULLS, sizeof(posed_hull *));
+    if (!s->deep_hull)
+        return ebpo_fail_memory(error, DEEP_HULLS * sizeof(posed_hull *));
+    posed_hull **hull = &s->deep_hull[ebpo_hash_number(code) % DEEP_HULLS];
+    if (!*hull || (*hull)->code != code) {
+        free(*hull);
+        *hull = make_hull(s, cell);
+    }
+    if (!*hull)
+        return ebpo_fail_memory(error, sizeof *s->chain);
     *out = (ebpo_convex){ (*hull)->count, (const double(*)[3])(*hull)->point };
     return EBPO_OK;
 }

@@ -32,7 +32,9 @@ typedef struct ebpo_posed_subtrees {
                                * requested; NULL: the entry is free */
     uint64_t hulls, slots;    /* number of envelopes; size of the table */
     uint64_t bytes;           /* memory of the envelopes and of the table */
-    struct envelope_chain *chain; /* for the next envelope; NULL: none was requested yet */
+    struct posed_hull **deep_hull; /* some envelopes of nodes below the roots of subtrees; NULL:
+                                    * none was requested yet */
+    struct envelope_chain *chain;  /* for the next envelope; NULL: none was requested yet */
 } ebpo_posed_subtrees;
 
 /* A node in the part of the tree that is in memory. */
@@ -63,16 +65,23 @@ ebpo_posed_node ebpo_posed_subtree_root(const ebpo_posed_subtrees *s);
 /* Returns a child of a gray node. */
 ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
                                  unsigned octant);
+
+/* Nodes of a partly loaded model below the roots of subtrees, if deep bounds (query/nearest.h) are
+ * in memory. ebpo_posed_deep_node returns the root of a subtree with this cell as a node of the
+ * deep bounds; it is gray if it has children. ebpo_posed_deep_child returns a child of a gray node.
+ * ebpo_posed_deep_envelope does the same as ebpo_posed_envelope for such nodes, but *out is valid
+ * only until the next call. */
+ebpo_posed_node ebpo_posed_deep_node(const ebpo_posed_subtrees *s, ebpo_cell cell);
+ebpo_posed_node ebpo_posed_deep_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
+                                      unsigned octant);
+EBPO_MUST_USE ebpo_status ebpo_posed_deep_envelope(ebpo_posed_subtrees *s, ebpo_cell cell,
+                                                   ebpo_convex *out, ebpo_error *error);
+
 /* Computes the posed corners of a cell. If bit k of a corner's index is 1, the corner has the
  * cell's upper coordinate on axis k. */
 void ebpo_posed_cell(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[8][3]);
 /* Computes the sum of the first and the last posed corner of a cell: twice the cell's middle. */
 void ebpo_posed_ends(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[3]);
-/* Writes boxes in the world that together contain all posed faces of a subtree, except for errors
- * up to ebpo_posed_slack. Returns their number; 0 if they are not known, because the subtree was
- * never loaded. */
-unsigned ebpo_posed_face_boxes(const ebpo_posed_subtrees *s, uint32_t number,
-                               ebpo_faces_box out[8]);
 /* Returns a bound of the errors that posing and cutting cause in the corners of the envelope of a
  * cell. max_coordinate: upper bound of the absolute values of posed coordinates. */
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate);

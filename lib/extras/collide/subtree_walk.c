@@ -2,10 +2,14 @@
  * that are entirely in memory (whole models).
  *
  * Two faces with a common point are listed by subtrees whose cells contain this point. So only
- * pairs of subtrees whose envelopes may have a common point must be searched. If both subtrees were
- * loaded before, boxes around their faces, from their skeletons, must also intersect. For all pairs
- * of faces, these pairs of subtrees are found before any subtree is loaded, and are sorted so that
- * a loaded subtree is used again soon. For a first contact, they are found one by one, the nearest
+ * pairs of subtrees whose envelopes may have a common point must be searched. The envelopes of the
+ * first levels below the roots of subtrees (deep bounds, query/nearest.h), if they are in memory,
+ * must also have a common point. If both subtrees were loaded before, the boxes and cylinders of
+ * their skeletons must intersect, too.
+ *
+ * For all pairs of faces, these pairs of subtrees are found before any subtree is loaded, and are
+ * sorted so that a loaded subtree is used again soon. If many subtrees were never loaded, the deep
+ * bounds are read first. For a first contact, pairs of subtrees are found one by one, the nearest
  * first, because nearly all of them are never needed. Several threads search pairs of subtrees. A
  * pair of faces is found more than once if several subtrees list one of its faces. So the pairs of
  * faces are stored, sorted and made unique before they are returned.
@@ -15,6 +19,7 @@
  * next round finds the dropped pairs again. */
 #include "core/strict_fp.h"
 
+#include <limits.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -28,6 +33,7 @@
 #include "extras/collide/subtree_walk.h"
 #include "extras/collide/posed_subtrees.h"
 #include "geometry/vec3.h"
+#include "query/nearest.h"
 
 /* Two subtrees that may have intersecting faces. */
 typedef struct subtree_pair {
@@ -60,26 +66,33 @@ typedef struct subtree_walk {
     uint64_t first_end; /* greater than the indices of all faces that the first subtree of the last
                          * pair lists */
     bool late;          /* the deadline passed before all pairs were found */
+    ebpo_skeleton_accel skeleton[2]; /* skeletons of a pair of subtrees that may be loaded */
 } subtree_walk;
 
 /* The search for pairs of subtrees. */
 typedef struct subtree_pair_search {
     subtree_pairs *out;
     ebpo_posed_subtrees *side[2];
-    double max_coordinate; /* upper bound of the absolute values of posed coordinates */
-    bool self;             /* as in subtree_walk */
+    const ebpo_collision *collision;
+    subtree_walk *walk; /* for walks through skeletons */
+    bool self;          /* as in subtree_walk */
     ebpo_error *error;
 } subtree_pair_search;
 
 static const char stage[] = "pairs of subtrees"; /* for the progress function */
+
+static ebpo_status fail_late(ebpo_error *error)
+{
+    return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
+}
 
 /* --- pairs of nodes --- */
 
 /* Returns the sum of the error bounds of both nodes' envelopes. */
 static double slack_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
-    return ebpo_posed_slack(f->side[0], node[0].cell, f->max_coordinate) +
-           ebpo_posed_slack(f->side[1], node[1].cell, f->max_coordinate);
+    return ebpo_posed_slack(f->side[0], node[0].cell, f->collision->max_coordinate) +
+           ebpo_posed_slack(f->side[1], node[1].cell, f->collision->max_coordinate);
 }
 
 /* Returns true if the cells of two nodes are certainly apart. */
@@ -120,7 +133,7 @@ static double apart_of(const subtree_pair_search *f, const ebpo_posed_node node[
 static double apart_bound(const subtree_pair_search *f, double apart, double sum, double least)
 {
     double bound = apart < 1 ? 1 + (apart - 1) * (sum / least) : apart,
-           error = 0x1p-40 * sum / least + 0x1p-44 * f->max_coordinate / least;
+           error = 0x1p-40 * sum / least + 0x1p-44 * f->collision->max_coordinate / least;
     return fmax(bound - error, 0);
 }
 
@@ -137,26 +150,116 @@ static subtree_pair pair_of(const subtree_pair_search *f, const ebpo_posed_node 
     return (subtree_pair){ a, b, f->side[0]->rank[a], f->side[1]->rank[b], apart_of(f, node) };
 }
 
-/* Returns true if the faces of two subtrees, which were loaded before, are certainly apart. */
-static bool faces_apart(const subtree_pair_search *f, const ebpo_posed_node node[2], double slack)
+/* Returns the index of the node of a pair that is divided: the larger one, but never the root of a
+ * subtree. */
+static int divided_of(const subtree_pair_search *f, const ebpo_posed_node node[2],
+                      const bool is_root[2])
 {
-    ebpo_faces_box box[2][8];
-    unsigned count[2];
-    for (int i = 0; i < 2; i++) {
-        count[i] = ebpo_posed_face_boxes(f->side[i], ebpo_entry_value(node[i].entry), box[i]);
-        if (count[i] == 0)
+    bool first_is_larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
+                           ebpo_posed_diagonal(f->side[1], node[1].cell);
+    return is_root[0] ? 1 : is_root[1] ? 0 : first_is_larger ? 0 : 1;
+}
+
+/* Returns a hierarchy over the faces of a subtree: of the whole model, or a copy of the skeleton in
+ * *copy. Returns NULL if there is no skeleton, because the subtree was never loaded. */
+static const ebpo_accel *hierarchy_of(const ebpo_model *m, uint32_t number,
+                                      ebpo_skeleton_accel *copy)
+{
+    if (m->whole)
+        return m->whole->bound_count ? m->whole : NULL;
+    const ebpo_skeleton *skeleton = ebpo_skeletons_find(m->skeletons, number);
+    if (skeleton)
+        ebpo_skeleton_copy(skeleton, copy);
+    return skeleton ? &copy->accel : NULL;
+}
+
+/* Returns true if the faces below all pairs of nodes on the stack of a walk are certainly apart. */
+static bool nodes_apart(ebpo_pair_walk *walk)
+{
+    const ebpo_accel *const *accel = walk->pair->accel;
+    while (walk->top > 0) {
+        ebpo_node_pair pair = walk->stack[--walk->top];
+        uint32_t a = accel[0]->bound[pair.a >> 3].child[pair.a & 7],
+                 b = accel[1]->bound[pair.b >> 3].child[pair.b & 7];
+        if (a & b & EBPO_IS_BLOCK || !walk->kernels->expand(walk, pair))
             return false;
     }
-    for (unsigned i = 0; i < count[0]; i++)
-        for (unsigned j = 0; j < count[1]; j++) {
-            bool apart = false;
-            for (int k = 0; k < 3; k++)
-                apart = apart || box[0][i].low[k] - slack > box[1][j].high[k] ||
-                        box[1][j].low[k] - slack > box[0][i].high[k];
-            if (!apart)
-                return false;
-        }
     return true;
+}
+
+/* Returns true if the faces of two subtrees, which were loaded before, are certainly apart, by the
+ * boxes and cylinders of their skeletons. */
+static bool faces_apart(const subtree_pair_search *f, const ebpo_posed_node node[2])
+{
+    const ebpo_collision *q = f->collision;
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    ebpo_pair_walk *walk = &f->walk->walk;
+    const ebpo_accel *accel[2];
+    ebpo_accel_pair pair;
+    for (int i = 0; i < 2; i++) {
+        accel[i] =
+            hierarchy_of(f->side[i]->model, ebpo_entry_value(node[i].entry), &f->walk->skeleton[i]);
+        if (!accel[i])
+            return false;
+    }
+    ebpo_accel_pair_make(&pair, accel, posing, q->max_coordinate);
+    if (pair.apart)
+        return true;
+    ebpo_pair_walk_begin(walk, &pair);
+    walk->first = walk->self = false;
+    return walk->kernels->start(walk) && nodes_apart(walk);
+}
+
+/* Returns true if boxes around the posed cells of two nodes are certainly apart. */
+static bool boxes_apart(const subtree_pair_search *f, const ebpo_posed_node node[2], double slack)
+{
+    double twice[2][3], size[2][3]; /* twice the middles of the cells; sizes of the boxes */
+    for (int i = 0; i < 2; i++) {
+        const ebpo_posed_subtrees *s = f->side[i];
+        ebpo_posed_ends(s, node[i].cell, twice[i]);
+        for (int k = 0; k < 3; k++) {
+            size[i][k] = 0;
+            for (int j = 0; j < 3; j++)
+                size[i][k] += fabs(s->posing.matrix[k][j]) * s->model->info->box_size[j];
+            size[i][k] /= (double)(1u << node[i].cell.level);
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        if (fabs(twice[0][k] - twice[1][k]) - (size[0][k] + size[1][k]) > 2 * slack)
+            return true;
+    return false;
+}
+
+/* Sets *apart to true if the envelopes of two nodes of deep bounds, or of all pairs of their
+ * descendants, are certainly apart. */
+static ebpo_status deep_apart(const subtree_pair_search *f, const ebpo_posed_node node[2],
+                              bool *apart)
+{
+    ebpo_convex convex[2];
+    ebpo_status status = EBPO_OK;
+    double slack = slack_of(f, node);
+    *apart = boxes_apart(f, node, slack);
+    if (*apart)
+        return EBPO_OK;
+    for (int i = 0; i < 2 && status == EBPO_OK; i++)
+        status = ebpo_posed_deep_envelope(f->side[i], node[i].cell, &convex[i], f->error);
+    if (status != EBPO_OK)
+        return status;
+    *apart = ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
+    bool is_end[2];
+    for (int i = 0; i < 2; i++)
+        is_end[i] = ebpo_entry_kind_of(node[i].entry) != EBPO_ENTRY_GRAY;
+    if (*apart || (is_end[0] && is_end[1]))
+        return EBPO_OK;
+    int divided = divided_of(f, node, is_end);
+    ebpo_posed_node part[2] = { node[0], node[1] };
+    *apart = true;
+    for (unsigned octant = 0; octant < 8 && *apart && status == EBPO_OK; octant++) {
+        part[divided] = ebpo_posed_deep_child(f->side[divided], &node[divided], octant);
+        if (ebpo_entry_kind_of(part[divided].entry) != EBPO_ENTRY_UNIFORM)
+            status = deep_apart(f, part, apart);
+    }
+    return status;
 }
 
 /* Sets *apart to true if a subtree of the pair is pruned, or the faces or envelopes of the
@@ -167,13 +270,20 @@ static ebpo_status envelopes_apart(const subtree_pair_search *f, const ebpo_pose
     ebpo_convex convex[2];
     double slack = slack_of(f, node);
     *apart = is_pruned(f->side[0], ebpo_entry_value(node[0].entry)) ||
-             is_pruned(f->side[1], ebpo_entry_value(node[1].entry)) || faces_apart(f, node, slack);
+             is_pruned(f->side[1], ebpo_entry_value(node[1].entry)) || faces_apart(f, node);
     if (*apart)
         return EBPO_OK;
     ebpo_status status = ebpo_posed_envelope(f->side[0], node[0].cell, &convex[0], f->error);
     if (status == EBPO_OK)
         status = ebpo_posed_envelope(f->side[1], node[1].cell, &convex[1], f->error);
     *apart = status == EBPO_OK && ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
+    const ebpo_model *const m[2] = { f->side[0]->model, f->side[1]->model };
+    if (status == EBPO_OK && !*apart && !m[0]->whole && !m[1]->whole &&
+        (m[0]->deep || m[1]->deep)) {
+        ebpo_posed_node deep[2] = { ebpo_posed_deep_node(f->side[0], node[0].cell),
+                                    ebpo_posed_deep_node(f->side[1], node[1].cell) };
+        status = deep_apart(f, deep, apart);
+    }
     return status;
 }
 
@@ -185,6 +295,8 @@ static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_pos
     bool apart;
     if (f->self && pair.rank_a > pair.rank_b)
         return EBPO_OK;
+    if (ebpo_collision_is_late(f->collision))
+        return fail_late(f->error);
     ebpo_status status = envelopes_apart(f, node, &apart);
     if (status != EBPO_OK || apart)
         return status;
@@ -196,16 +308,6 @@ static ebpo_status add_subtree_pair(const subtree_pair_search *f, const ebpo_pos
 }
 
 /* --- the descent --- */
-
-/* Returns the index of the node of a pair that is divided: the larger one, but never the root of a
- * subtree. */
-static int divided_of(const subtree_pair_search *f, const ebpo_posed_node node[2],
-                      const bool is_root[2])
-{
-    bool first_is_larger = ebpo_posed_diagonal(f->side[0], node[0].cell) >=
-                           ebpo_posed_diagonal(f->side[1], node[1].cell);
-    return is_root[0] ? 1 : is_root[1] ? 0 : first_is_larger ? 0 : 1;
-}
 
 /* Finds the pairs of subtrees below two nodes whose envelopes may have a common point. */
 static ebpo_status descend_pair(const subtree_pair_search *f, const ebpo_posed_node node[2])
@@ -252,31 +354,57 @@ static void reverse_pairs(subtree_pair *pair, uint64_t count)
 }
 
 /* Sorts pairs by the rank of the first subtree. Pairs with the same first subtree are a group. In
- * the groups, the rank of the second subtree ascends and descends alternately. Sets subtrees[0] to
- * the number of groups. */
+ * the groups, the rank of the second subtree ascends and descends alternately. */
 static void sort_back_and_forth(subtree_pairs *p)
 {
+    uint64_t groups = 0;
     if (p->count)
         qsort(p->pair, p->count, sizeof *p->pair, by_rank);
     for (uint64_t begin = 0, end; begin < p->count; begin = end) {
         for (end = begin + 1; end < p->count && p->pair[end].a == p->pair[begin].a;)
             end++;
-        if (p->subtrees[0]++ % 2)
+        if (groups++ % 2)
             reverse_pairs(p->pair + begin, end - begin);
     }
 }
 
-/* Sets subtrees[1] to the number of different second subtrees, which have indices below `most`. */
-static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_error *error)
+/* Sets subtrees[side] to the number of different subtrees of a model in the pairs. *added: set to
+ * the number of them that were never loaded. */
+static ebpo_status count_subtrees(subtree_pairs *p, int side, const ebpo_posed_subtrees *all,
+                                  uint64_t *added, ebpo_error *error)
 {
-    bool *visited = ebpo_alloc_zero(most, sizeof *visited);
+    bool *visited = ebpo_alloc_zero(all->count, sizeof *visited);
+    p->subtrees[side] = *added = 0;
     if (!visited)
-        return ebpo_fail_memory(error, most);
+        return ebpo_fail_memory(error, all->count);
     for (uint64_t i = 0; i < p->count; i++) {
-        p->subtrees[1] += !visited[p->pair[i].b];
-        visited[p->pair[i].b] = true;
+        uint32_t number = side == 0 ? p->pair[i].a : p->pair[i].b;
+        if (visited[number])
+            continue;
+        visited[number] = true;
+        p->subtrees[side]++;
+        *added += !ebpo_skeletons_find(all->model->skeletons, number);
     }
     free(visited);
+    return EBPO_OK;
+}
+
+/* Counts the subtrees of both models. Reads the deep bounds of a model that has many subtrees in
+ * the pairs that were never loaded. Sets *more to true if deep bounds were read. */
+static ebpo_status count_both(const subtree_pair_search *f, bool *more)
+{
+    *more = false;
+    for (int i = 0; i < 2; i++) {
+        ebpo_model *m = f->collision->model[i];
+        uint64_t added;
+        ebpo_status status = count_subtrees(f->out, i, f->side[i], &added, f->error);
+        if (status != EBPO_OK)
+            return status;
+        if (m->whole || m->deep)
+            continue;
+        ebpo_deep_bounds_report(m, added < UINT_MAX ? (unsigned)added : UINT_MAX);
+        *more = *more || m->deep;
+    }
     return EBPO_OK;
 }
 
@@ -285,18 +413,20 @@ static ebpo_status count_second_subtrees(subtree_pairs *p, uint64_t most, ebpo_e
  * has a subtree that lists the model's face and whose cell contains the point. These two subtrees
  * are a pair of the result. self: both models are the same model at the same pose; each pair is
  * found once, with rank_a <= rank_b. The caller frees out->pair, even after a failure. */
-static ebpo_status find_subtree_pairs(subtree_pairs *out, ebpo_posed_subtrees *a,
-                                      ebpo_posed_subtrees *b, double max_coordinate, bool self,
-                                      ebpo_error *error)
+static ebpo_status find_subtree_pairs(const subtree_pair_search *f)
 {
-    subtree_pair_search f = { out, { a, b }, max_coordinate, self, error };
-    ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
-    *out = (subtree_pairs){ .count = 0 };
-    ebpo_status status = descend_pair(&f, root);
-    if (status != EBPO_OK)
-        return status;
-    sort_back_and_forth(out);
-    return count_second_subtrees(out, b->count, error);
+    ebpo_posed_node root[2] = { ebpo_posed_subtree_root(f->side[0]),
+                                ebpo_posed_subtree_root(f->side[1]) };
+    ebpo_status status = EBPO_OK;
+    for (bool more = true; more && status == EBPO_OK;) { /* again if deep bounds were read */
+        f->out->count = 0;
+        status = descend_pair(f, root);
+        if (status == EBPO_OK)
+            status = count_both(f, &more);
+    }
+    if (status == EBPO_OK)
+        sort_back_and_forth(f->out);
+    return status;
 }
 
 /* --- the nearest pairs --- */
@@ -327,7 +457,6 @@ EBPO_HEAP(nearest, waiting_nodes, comes_before)
  * of `apart`, then of their ranks. Most pairs are never needed, and their envelopes are not
  * computed. */
 typedef struct nearest_pairs {
-    const ebpo_collision *collision;
     subtree_pair_search search;
     double least; /* as in apart_bound */
     waiting_nodes *heap;
@@ -384,13 +513,13 @@ static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], d
 }
 
 /* Begins with the roots of both trees. The caller frees p->heap, even after a failure. */
-static ebpo_status begin_nearest(nearest_pairs *p, const ebpo_collision *q, ebpo_posed_subtrees *a,
-                                 ebpo_posed_subtrees *b, ebpo_error *error)
+static ebpo_status begin_nearest(nearest_pairs *p, const subtree_pair_search *search)
 {
-    ebpo_posed_node root[2] = { ebpo_posed_subtree_root(a), ebpo_posed_subtree_root(b) };
-    *p = (nearest_pairs){ .collision = q,
-                          .search = { NULL, { a, b }, q->max_coordinate, false, error },
-                          .least = least_diagonal(a) + least_diagonal(b) };
+    ebpo_posed_subtrees *const *side = search->side;
+    ebpo_posed_node root[2] = { ebpo_posed_subtree_root(side[0]),
+                                ebpo_posed_subtree_root(side[1]) };
+    *p = (nearest_pairs){ .search = *search,
+                          .least = least_diagonal(side[0]) + least_diagonal(side[1]) };
     return push_nodes(p, root, 0);
 }
 
@@ -416,8 +545,9 @@ static ebpo_status count_step(nearest_pairs *p)
 {
     if (++p->steps % STEPS_AT_A_TIME)
         return EBPO_OK;
-    p->late = ebpo_collision_is_late(p->collision);
-    return ebpo_progress_step(&p->collision->options.progress, stage, p->found, 0, p->search.error)
+    p->late = ebpo_collision_is_late(p->search.collision);
+    return ebpo_progress_step(&p->search.collision->options.progress, stage, p->found, 0,
+                              p->search.error)
                ? EBPO_OK
                : EBPO_E_CANCELLED;
 }
@@ -709,7 +839,7 @@ static ebpo_status run_pairs(void *user, uint64_t begin, uint64_t end, unsigned 
         if (status != EBPO_OK)
             return status;
         if (w->late || ebpo_collision_is_late(g->collision))
-            return ebpo_fail(error, EBPO_E_CANCELLED, "%s: the deadline has passed", stage);
+            return fail_late(error);
     }
     return EBPO_OK;
 }
@@ -784,7 +914,7 @@ static ebpo_status begin_threads(gathering_parts *g, unsigned threads, ebpo_erro
 {
     const ebpo_collision *q = g->collision;
     ebpo_status status = EBPO_OK;
-    g->walk = ebpo_alloc_zero(threads, sizeof *g->walk);
+    g->walk = ebpo_alloc_lines(threads, sizeof *g->walk);
     if (!g->walk)
         return ebpo_fail_memory(error, threads * sizeof *g->walk);
     g->threads = threads;
@@ -797,16 +927,29 @@ static ebpo_status begin_threads(gathering_parts *g, unsigned threads, ebpo_erro
     return status;
 }
 
+/* Returns a search for pairs of subtrees, for one thread, after begin_threads. */
+static subtree_pair_search pair_search_of(gathering_parts *g, ebpo_error *error)
+{
+    ebpo_posed_subtrees *s = g->subtrees; /* if g->self, both models share the envelopes */
+    return (subtree_pair_search){ &g->pairs,    { s, s + !g->self },
+                                  g->collision, &g->walk[0],
+                                  g->self,      error };
+}
+
 /* Prepares the search of `threads` threads, and finds the pairs of subtrees. */
 static ebpo_status begin_gathering(gathering_parts *g, unsigned threads, ebpo_error *error)
 {
     const ebpo_collision *q = g->collision;
     ebpo_status status = begin_threads(g, threads, error);
-    if (status == EBPO_OK) /* if g->self, both models share the envelopes */
-        status = find_subtree_pairs(&g->pairs, &g->subtrees[0], &g->subtrees[!g->self],
-                                    q->max_coordinate, g->self, error);
+    if (status == EBPO_OK) {
+        subtree_pair_search search = pair_search_of(g, error);
+        status = find_subtree_pairs(&search);
+    }
     if (status != EBPO_OK)
         return status;
+    if (q->collider->backward)
+        reverse_pairs(g->pairs.pair, g->pairs.count);
+    q->collider->backward = !q->collider->backward;
     q->collider->subtree_pairs += g->pairs.count;
     q->collider->subtrees += g->pairs.subtrees[0] + g->pairs.subtrees[1];
     g->end = ebpo_alloc_zero(g->subtrees[0].count, sizeof *g->end);
@@ -897,8 +1040,10 @@ ebpo_status ebpo_first_of_parts(const ebpo_collision *q, ebpo_face_pair *out, in
         if (!visited[i])
             status = ebpo_fail_memory(error, g.subtrees[i].count);
     }
-    if (status == EBPO_OK)
-        status = begin_nearest(&pairs, q, &g.subtrees[0], &g.subtrees[1], error);
+    if (status == EBPO_OK) {
+        subtree_pair_search search = pair_search_of(&g, error);
+        status = begin_nearest(&pairs, &search);
+    }
     if (status == EBPO_OK)
         status = search_first_parts(&g, &pairs, visited, out, found, error);
     free(pairs.heap);
