@@ -665,9 +665,9 @@ typedef struct ebpo_collider_stats {
     /*
      * Counts for partly loaded models. subtree_pairs: number of visited pairs of subtrees. The
      * envelopes of such a pair are near each other; if both subtrees were loaded before, also the
-     * bounds of their faces. subtrees: number of subtrees in these pairs. loads: number of times that
-     * a subtree was loaded. bytes_read: number of bytes read from the files during the queries,
-     * including reads by other users of the files.
+     * bounds of their faces. subtrees: number of subtrees in these pairs. loads: number of times
+     * that a subtree was loaded. bytes_read: number of bytes read from the files during the
+     * queries, including reads by other users of the files.
      */
     uint64_t subtree_pairs, subtrees, loads, bytes_read;
 } ebpo_collider_stats;
