@@ -7,7 +7,9 @@
  * A subtree is needed if no envelope of the file shows that all of its faces are farther than the
  * nearest face. For each level, prints the number of subtrees that remain when the envelopes down
  * to this level are known; then the subtrees that the queries searched and loaded. All values are
- * means over the points. */
+ * means over the points. *different* is the number of different subtrees, divided by the number of
+ * points: a method that keeps every subtree in memory, but knows only the envelopes, loads this
+ * many subtrees for each point. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -51,9 +53,24 @@ typedef struct walk {
     const ebpo_top *top;
     ebpo_ranking ranking;
     int cut_level;
-    double limit;  /* distance of the nearest face */
-    uint64_t near; /* number of subtrees that are not farther */
+    double limit;                 /* distance of the nearest face */
+    uint64_t near;                /* number of subtrees that are not farther */
+    const ebpo_node_table *nodes; /* of the model's top */
+    bool *seen; /* [subtrees of the model] the subtree was not farther than the nearest face of a
+                 * point */
+    uint64_t different; /* number of such subtrees */
 } walk;
+
+/* Marks the subtree whose root has a cell. */
+static void mark_subtree(walk *w, ebpo_cell cell)
+{
+    uint32_t entry = w->nodes->root;
+    for (int level = 0; level < cell.level; level++)
+        entry = ebpo_table_child(w->nodes, entry, ebpo_cell_octant(cell, level));
+    bool *seen = &w->seen[ebpo_entry_value(entry)];
+    w->different += !*seen;
+    *seen = true;
+}
 
 /* Returns true if a node that is not farther than the limit has a leaf or a node of the deepest
  * known level that is not farther. Counts the subtrees of which this is true. */
@@ -71,8 +88,11 @@ static bool is_near(walk *w, uint32_t entry, ebpo_cell cell)
     for (unsigned octant = 0; octant < 8 && kind == EBPO_ENTRY_GRAY; octant++)
         near |= is_near(w, ebpo_table_child(&w->top->nodes, entry, octant),
                         ebpo_cell_child(cell, octant));
-    w->near += near && (cell.level == w->cut_level ||
-                        (cell.level < w->cut_level && kind != EBPO_ENTRY_GRAY));
+    if (near &&
+        (cell.level == w->cut_level || (cell.level < w->cut_level && kind != EBPO_ENTRY_GRAY))) {
+        w->near++;
+        mark_subtree(w, cell);
+    }
     return near;
 }
 
@@ -102,8 +122,14 @@ int main(int argc, char **argv)
         distance[i] = fabs(result.distance);
     }
     for (int level = m->top->cut_level; level < m->info->level_count; level++) {
-        walk w = { .cut_level = m->top->cut_level };
+        walk w = { .cut_level = m->top->cut_level,
+                   .nodes = &m->top->nodes,
+                   .seen = calloc(m->top->below_count, sizeof(bool)) };
         ebpo_top *top;
+        if (!w.seen) {
+            perror("needed_subtrees");
+            return EXIT_FAILURE;
+        }
         check(ebpo_top_read_envelopes(&top, file, level, 0, &error));
         w.top = top;
         for (uint64_t i = 0; i < count; i++) {
@@ -111,8 +137,10 @@ int main(int argc, char **argv)
             w.limit = distance[i];
             is_near(&w, top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
         }
-        printf("level %d: %.2f subtrees\n", level, (double)w.near / (double)count);
+        printf("level %d: %.2f subtrees, different: %.2f\n", level, (double)w.near / (double)count,
+               (double)w.different / (double)count);
         ebpo_top_free(top);
+        free(w.seen);
     }
     printf("searched: %.2f, loaded: %.2f\n", (double)c->searched / (double)count,
            (double)c->loaded / (double)count);
