@@ -561,10 +561,12 @@ static ebpo_status next_nearest(nearest_pairs *p, subtree_pair *out, bool *more)
     while (status == EBPO_OK && p->count && !p->late) {
         waiting_nodes next = nearest_take(p->heap, p->count--);
         bool apart = waiting_apart(&p->search, &next);
-        if (!apart && next.ends)
+        if (!apart && next.ends) {
             status = envelopes_apart(&p->search, next.node, &apart);
-        else if (!apart)
+            p->late = ebpo_collision_is_late(p->search.collision);
+        } else if (!apart) {
             status = divide_nodes(p, &next);
+        }
         if (status == EBPO_OK && !apart && next.ends) {
             *out = pair_of(&p->search, next.node);
             *more = true;
