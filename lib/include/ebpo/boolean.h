@@ -350,7 +350,8 @@ typedef struct ebpo_boolean_mesh_options {
 
     /*
      * True: coordinates of the mesh are doubles. False: coordinates are floats if all operands have
-     * floats and the result is in the range of floats. Otherwise they are doubles.
+     * floats, and if each operand that the expression uses is in the range of floats, and at most
+     * 1,024 times farther from the origin than it is long. Otherwise they are doubles.
      */
     bool doubles;
 
