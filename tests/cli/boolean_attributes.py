@@ -1,4 +1,5 @@
-"""boolean_attributes.py EBPO: attributes of a Boolean result are those of the models, also at new vertices.
+"""boolean_attributes.py EBPO: attributes of a Boolean result are those of the models, also at new vertices. The
+changes of a model, with the faces that stay, are the result.
 
 A has a scalar and colours that are linear in the position, normals, and a label of each face. B has labels and
 normals only, and is turned. The expected values are computed from the positions and origins in the result.
@@ -64,7 +65,24 @@ def check(right, what):
         sys.exit(1)
 
 
+def check_changes():
+    """Test the ranges of removed faces. A, the sphere, has another order of faces in its file than in its source."""
+    operands = ["A - B", "s.ebpo.h5", "s.ebpo.h5", "--pose", "B 0.5 0.25 0", "--double", "-o"]
+    for out in ["result.ply"], ["changes.ply", "--changed-only"]:
+        subprocess.run([ebpo, "boolean", *operands, *out], check=True, capture_output=True)
+    subprocess.run([ebpo, "extract", "s.ebpo.h5", "base.ply", "--subtree", "1"], check=True, capture_output=True)
+    base, changes, result, faces = read("base.ply"), read("changes.ply"), read("result.ply"), {}
+    removed = {r["first"] + i for r in changes["removed"] for i in range(r["count"])}
+    base["face"] = [f for i, f in enumerate(base["face"]) if i not in removed]
+    check(0 < len(base["face"]) < len(result["face"]) and removed, "removed faces")
+    for name, *meshes in ("result", result), ("changes", base, changes):
+        corners = [[tuple(m["vertex"][i][k] for k in "xyz") for i in f["corners"]] for m in meshes for f in m["face"]]
+        faces[name] = sorted(min(f[i:] + f[:i] for i in range(3)) for f in corners)
+    check(faces["changes"] == faces["result"], "changes")
+
+
 ebpo = sys.argv[1]
+check_changes()
 write("aa.ply", ["property double s", *(f"property uchar {c}" for c in ("red", "green", "blue"))], (0, 0, 1),
       lambda p: (scalar(p), *(255 * c for c in p)))
 write("bb.ply", [], (1, 0, 0), lambda p: ())

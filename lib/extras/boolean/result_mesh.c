@@ -515,15 +515,25 @@ static uint64_t count_whole(const output *o, uint32_t operand)
     return count;
 }
 
-/* Returns true if an operand has coordinates beyond the range of floats. Then the result may have
- * such coordinates, too. Half-spaces are not tested, because the result is also in the box of the
- * other operands. */
+/* Floats have 24 bits. If an operand is farther from the origin than this number of its sizes,
+ * floats would leave fewer than 14 bits for its shape. */
+enum { FAR = 1 << 10 };
+
+/* Returns true if an operand has coordinates beyond the range of floats, or is far from the origin,
+ * for example because of its pose. Then floats cannot represent the result well. Half-spaces are
+ * not tested, because the result is also in the box of the other operands. */
 static bool exceeds_floats(const ebpo_face_list *faces)
 {
-    for (uint32_t i = 0; i < faces->boolean->first_plane; i++)
-        for (int k = 0; k < 6 && faces->equal[i]; k++)
-            if (fabs(faces->boolean->solid[i].box[k]) > FLT_MAX)
-                return true;
+    for (uint32_t i = 0; i < faces->boolean->first_plane; i++) {
+        const double *box = faces->boolean->solid[i].box;
+        double most = 0, size = 0;
+        for (int k = 0; k < 3 && faces->equal[i]; k++) {
+            most = fmax(most, fmax(fabs(box[k]), fabs(box[3 + k])));
+            size = fmax(size, box[3 + k] - box[k]);
+        }
+        if (most > FLT_MAX || most > FAR * size)
+            return true;
+    }
     return false;
 }
 

@@ -350,7 +350,8 @@ typedef struct ebpo_boolean_mesh_options {
 
     /*
      * True: coordinates of the mesh are doubles. False: coordinates are floats if all operands have
-     * floats and the result is in the range of floats. Otherwise they are doubles.
+     * floats, and if each operand that the expression uses is in the range of floats, and at most
+     * 1,024 times farther from the origin than it is long. Otherwise they are doubles.
      */
     bool doubles;
 
@@ -367,12 +368,13 @@ typedef struct ebpo_boolean_mesh_options {
     /*
      * True: the mesh omits the faces of operand 0 that are unchanged in the result. The attribute
      * `removed` (columns `first` and `count`) of the mesh has the ranges of the faces of operand 0
-     * that are not faces of the result. Indices are indices in the file of operand 0.
-     * ebpo_mesh_write_ply writes `removed` as an element. The mesh and the faces of operand 0
-     * outside these ranges together are the result. Self-intersections of operand 0 are not cut, so
-     * faces that stay may intersect each other. Only the part of operand 0 near or in the other
-     * operands is read, and its faces near their surfaces must fit in memory, as must reversed
-     * faces. `volume` and `attributes` must be false.
+     * that are not faces of the result. Indices are indices in the file of operand 0
+     * (ebpo_file_read_mesh, not ebpo_file_read_source_mesh). ebpo_mesh_write_ply writes `removed`
+     * as an element. The mesh and the faces of operand 0 outside these ranges, at its pose,
+     * together are the result by the rule of operand 0. Self-intersections of operand 0 are not
+     * cut, so faces that stay may intersect each other. Only the part of operand 0 near or in the
+     * other operands is read, and its faces near their surfaces must fit in memory, as must
+     * reversed faces. `volume` and `attributes` must be false.
      */
     bool changed_only;
 
@@ -449,13 +451,14 @@ typedef struct ebpo_boolean_mesh_report {
 /*
  * Makes the mesh of the result. Faces of operands are cut exactly along their intersections with
  * all other faces, including coplanar faces and faces of the same operand. The parts that bound the
- * result are kept, and reversed if necessary. Faces that are not cut keep their posed corners. All
- * other vertices are the exact vertices of the result, rounded to the nearest coordinates. The mesh
- * is closed: each edge is used equally often in both directions. Rounding may create small
- * intersections of faces (ebpo_mesh_self_intersections). Vertices of cut faces that become equal by
- * rounding are merged, and faces that lose a corner in this way are omitted. Winding numbers of the
- * mesh are 1 in the result and 0 elsewhere, except near rounded vertices. The mesh is the same for
- * any number of threads.
+ * result are kept, and reversed if necessary. Faces that are not cut keep their posed corners,
+ * which are rounded only if the mesh has floats. All other vertices are the exact vertices of the
+ * result, rounded to the nearest coordinates. The mesh is closed: each edge is used equally often
+ * in both directions. Rounding may create small intersections of faces
+ * (ebpo_mesh_self_intersections). Vertices of cut faces that become equal by rounding are merged,
+ * and faces that lose a corner in this way are omitted. Winding numbers of the mesh are 1 in the
+ * result and 0 elsewhere, except near rounded vertices. The mesh is the same for any number of
+ * threads.
  *
  * Memory, which a workspace may limit: about 40 bytes for each face of one operand (operands are
  * processed one after the other), and 25 bytes for each face of the mesh. Memory that no workspace
@@ -466,7 +469,9 @@ typedef struct ebpo_boolean_mesh_report {
  *
  * EBPO_E_ARGUMENT: `changed_only` is true, and one of these conditions is met: the expression does
  * not use operand 0; `volume` is true; `attributes` is true.
- * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: more than 2^31 - 1 faces or 2^31 vertices.
+ * EBPO_E_ABSENT: an operand is a subset. EBPO_E_LIMIT: an operand has more than 2^31 - 1 faces, its
+ * cut faces have more parts or points than that, or the result has more than 2^32 - 2 faces or
+ * vertices.
  * EBPO_E_FORMAT: an operand is not closed, although its file says that it is a solid.
  * EBPO_E_UNSUPPORTED: `changed_only` is true, and operand 0 is cut or reversed where its faces
  * intersect each other, have no area, or have a side with a winding number other than 0 and 1. Also

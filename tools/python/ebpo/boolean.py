@@ -98,7 +98,8 @@ def boolean(expression: str, models: Sequence[Model | Scene], *, poses: Sequence
     time: time of scenes in seconds. None: the first time of each scene.
     box: (2, 3), low and high corner of a box to which the result is cut.
     planes: (n, 4) or (4,), rows of a, b, c, d: the result is cut to the points with ax + by + cz <= d.
-    doubles: True: float64 coordinates; False: float32 if all models have float32.
+    doubles: True: float64 coordinates; False: float32 if all models have float32 and are near
+        the origin (at most 1,024 times farther than they are long).
     volume: True: compute the volume.
     memory: budget in bytes for the process; the rest is stored in temporary files in temp_dir. None: no limit.
     temp_dir: folder for these files, and for the small files of box and planes.
