@@ -75,8 +75,10 @@ static double gap_between(const ebpo_cap_node *n, const ebpo_cap_box *q, const d
 {
     if (q->radius > 0) {
         double apart[3];
-        for (int k = 0; k < 3; k++)
-            apart[k] = fmax(fabs(x[k]) * (1 - 0x1p-50) - q->half[k], 0);
+        for (int k = 0; k < 3; k++) {
+            double outside = fabs(x[k]) * (1 - 0x1p-50) - q->half[k];
+            apart[k] = outside > 0 ? outside : 0;
+        }
         distance = ebpo_vec3_length(apart);
     }
     return distance * (1 - 0x1p-40) - n->radius * ENLARGE;
@@ -124,14 +126,16 @@ static ebpo_bounded bound_second_order(const ebpo_cap_node *n, const ebpo_cap_bo
     if (q->radius > 0)
         for (int k = 0; k < 3; k++)
             slope[k] = (3 * along * u[k] - n->vector[k]) * square * unit;
-    /* two bounds of the remainder, by the gap and by the distance of the centres */
-    double remainder = 1.5 * inverse * inverse, e = (ratio + reach) * ENLARGE;
-    if (e < 0.75)
-        remainder = fmin(remainder, 2 * square * square * (3 - 2 * e) / ((1 - e) * (1 - e)));
     double rounding =
         n->area * (0x1p-21 * ratio + 0x1p-40 * (1 + reach)) + (4 + 2 * reach) * n->slack;
+    /* two bounds of the remainder: by the gap, and by the distance of the centres */
+    double remainder = n->area * (1.5 * spread * spread * inverse) * inverse,
+           e = (ratio + reach) * ENLARGE, part = spread * unit / (1 - e),
+           by_centres = n->area * (part * part * (3 - 2 * e)) * square;
+    if (e < 0.75 && by_centres < remainder)
+        remainder = by_centres;
     return (ebpo_bounded){ (along + n->area * ratio * moment) * square,
-                           n->area * spread * spread * remainder + rounding * inverse };
+                           remainder + rounding * inverse };
 }
 
 /* Bounds the same sum by the bound of the tree's order, the area and the weights. The slope is set
