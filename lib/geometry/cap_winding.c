@@ -227,6 +227,8 @@ static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_
 /* The tolerance of a first sum without an estimate of w. */
 static const double FIRST_TOLERANCE = 0x1p-5;
 
+/* Decides by sums over the whole tree, and then by numbers of 512 bits. `first`: the tolerance of
+ * the first sum. */
 static ebpo_cap_decision decide_by_tree(const ebpo_cap_tree *tree, const double p[3],
                                         int32_t winding, const ebpo_cap_rule *rule, double first)
 {
