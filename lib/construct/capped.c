@@ -74,20 +74,21 @@ static bool divide_cell(ebpo_capped *c, ebpo_cap_front *front, const cap_cell *p
                            .begin = c->lists.count,
                            .far = parent->far };
         ebpo_cell cell = ebpo_cell_of_octcode(child.code);
+        ebpo_cap_field far = { .at_centre = parent->far }; /* of the first order: without slope */
         double low[3], high[3];
         ebpo_cell_bounds(c->box, cell, low, high);
         const ebpo_cap_box box = ebpo_cap_box_of(low, high);
         ebpo_status status = ebpo_cap_lists_narrow(&c->lists, &c->caps, &box, parent->begin,
-                                                   parent->end, list_max, &child.far);
+                                                   parent->end, list_max, &far);
+        child.far = far.at_centre;
         if (status == EBPO_E_MEMORY)
             return false;
         child.has_no_list = status == EBPO_E_LIMIT;
         child.end = c->lists.count;
-        int small =
-            child.has_no_list
-                ? 0
-                : ebpo_cap_small_in(front, &c->caps, low, high, c->lists.entry + child.begin,
-                                    child.end - child.begin, child.far, threshold);
+        int small = child.has_no_list ? 0
+                                      : ebpo_cap_small_in(front, &c->caps, low, high,
+                                                          c->lists.entry + child.begin,
+                                                          child.end - child.begin, &far, threshold);
         child.is_end = small == 0;
         if (small == 1) {
             c->lists.count = child.begin;
@@ -303,7 +304,7 @@ bool ebpo_capped_may_hold(const ebpo_capped *capped, ebpo_cell cell, int32_t win
     ebpo_cell_bounds(capped->box, cell, low, high);
     const ebpo_cap_box box = ebpo_cap_box_of(low, high), centre = ebpo_cap_point(box.centre);
     ebpo_cap_front_begin(&front, &capped->caps, &box, capped->lists.entry + found->begin,
-                         found->end - found->begin, found->far);
+                         found->end - found->begin, &(ebpo_cap_field){ .at_centre = found->far });
     int result = ebpo_cap_front_result(&front, &capped->rule, winding, -1, &terms);
     if (result >= 0)
         return result;

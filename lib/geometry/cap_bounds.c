@@ -15,9 +15,13 @@
  * Second order. Let X = c - q, d = |X| >= g, and f' the derivative of f at X, a symmetric matrix.
  * Its product with V has the norm sqrt(|V|^2 + 3 (V . X / d)^2) / d^3. The norm of the difference
  * between x - p and X is at most |x - c| + s, and the norm of the second derivative of f is at most
- * 6 / g^4. So the half angle differs from half of V . f(X) + I, where I is the integral of (f' (x -
- * c)) . dA, by at most s |f' V| / 2 + 1.5 a (D + s)^2 / g^4. D is the root mean square of |x - c|
- * over the area. With the matrix M = `moment`, I = a R (trace M - 3 X^T M X / d^2) / d^3.
+ * 6 / g^4. So the half angle differs from half of V . f(X) + I - (f' V) . (p - q), where I is the
+ * integral of (f' (x - c)) . dA, by at most 1.5 a (D + s)^2 / g^4. D is the root mean square of |x
+ * - c| over the area. With e = (R + s) / d < 1, a point at the part t of the way from X to x - p
+ * has a norm of at least d (1 - t e). The integral of (1 - t) 6 / (d (1 - t e))^4 over t gives
+ * another bound of the same difference, a (D + s)^2 (3 - 2 e) / (2 d^4 (1 - e)^2). f' V = (V - 3 (V
+ * . u) u) / d^3 with u = X / d. With the matrix M = `moment`, I = a R (trace M - 3 X^T M X / d^2) /
+ * d^3.
  *
  * Border edges. Away from the faces of S, w_S is smooth, also on caps. The gradient of 4 pi w_S is
  * the integral of (x - p) x dx / r^3 along the border (the law of Biot and Savart). An edge of
@@ -27,7 +31,8 @@
  * bound of the derivative of f.
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V; `slack` bounds
- * the error of V, so it changes I by at most 5 `slack` / d^2. Rounding to float changes I by at
+ * the error of V, so it changes I by at most 5 `slack` / d^2, and (f' V) . (p - q) by at most 2 s
+ * `slack` / d^3. Rounding to float changes I by at
  * most 2^-20 a R / d^3. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances
  * are used only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900 may
  * underflow. They change the results by less than the constants TINY and 2^-500, which are added.
@@ -70,8 +75,10 @@ static double gap_between(const ebpo_cap_node *n, const ebpo_cap_box *q, const d
 {
     if (q->radius > 0) {
         double apart[3];
-        for (int k = 0; k < 3; k++)
-            apart[k] = fmax(fabs(x[k]) * (1 - 0x1p-50) - q->half[k], 0);
+        for (int k = 0; k < 3; k++) {
+            double outside = fabs(x[k]) * (1 - 0x1p-50) - q->half[k];
+            apart[k] = outside > 0 ? outside : 0;
+        }
         distance = ebpo_vec3_length(apart);
     }
     return distance * (1 - 0x1p-40) - n->radius * ENLARGE;
@@ -103,12 +110,13 @@ static ebpo_bounded bound_first_order(const ebpo_cap_node *n, const ebpo_cap_box
                            (n->area * (ball / at->gap + 0x1p-44) + n->slack) * inverse };
 }
 
+/* Returns the bounds at the centre of the box. The sum has the slope `slope` in the box. */
 static ebpo_bounded bound_second_order(const ebpo_cap_node *n, const ebpo_cap_box *q,
-                                       const placed *at, double inverse)
+                                       const placed *at, double inverse, double slope[3])
 {
     const float *m = n->moment;
     double u[3], unit = 1 / at->d, square = unit * unit / 2, ratio = n->radius * unit,
-                 spread = n->spread * n->radius + q->radius, moving = 0;
+                 spread = n->spread * n->radius + q->radius, reach = q->radius * unit;
     for (int k = 0; k < 3; k++)
         u[k] = at->x[k] * unit;
     double along = ebpo_vec3_dot(n->vector, u),
@@ -116,34 +124,53 @@ static ebpo_bounded bound_second_order(const ebpo_cap_node *n, const ebpo_cap_bo
                     3 * (m[0] * u[0] * u[0] + m[1] * u[1] * u[1] + m[2] * u[2] * u[2] +
                          2 * (m[3] * u[0] * u[1] + m[4] * u[1] * u[2] + m[5] * u[2] * u[0]));
     if (q->radius > 0)
-        moving = sqrt(ebpo_vec3_dot(n->vector, n->vector) + 3 * along * along) * q->radius * unit;
-    double rounding = n->area * (0x1p-21 * ratio + 0x1p-40) + 4 * n->slack;
+        for (int k = 0; k < 3; k++)
+            slope[k] = (3 * along * u[k] - n->vector[k]) * square * unit;
+    double rounding =
+        n->area * (0x1p-21 * ratio + 0x1p-40 * (1 + reach)) + (4 + 2 * reach) * n->slack;
+    /* two bounds of the remainder: by the gap, and by the distance of the centres */
+    double remainder = n->area * (1.5 * spread * spread * inverse) * inverse,
+           e = (ratio + reach) * ENLARGE, part = spread * unit / (1 - e),
+           by_centres = n->area * (part * part * (3 - 2 * e)) * square;
+    if (e < 0.75 && by_centres < remainder)
+        remainder = by_centres;
     return (ebpo_bounded){ (along + n->area * ratio * moment) * square,
-                           moving * square +
-                               (n->area * (1.5 * spread * spread * inverse) + rounding) * inverse };
+                           remainder + rounding * inverse };
 }
 
-/* Bounds the same sum by the bound of the tree's order, the area and the weights. */
+/* Bounds the same sum by the bound of the tree's order, the area and the weights. The slope is set
+ * if the box is not a point. */
 static ebpo_bounded bound_placed(const ebpo_cap_tree *t, const ebpo_cap_node *n,
-                                 const ebpo_cap_box *q, const placed *at)
+                                 const ebpo_cap_box *q, const placed *at, double slope[3])
 {
     const ebpo_bounded unknown = { 0, n->most };
-    if (!(at->gap > DISTANCE_MIN) || !(at->d < DISTANCE_MAX))
-        return unknown;
-    double inverse = 1 / (at->gap * at->gap), simple = n->area * inverse / 2;
-    ebpo_bounded b = t->second_order ? bound_second_order(n, q, at, inverse)
-                                     : bound_first_order(n, q, at, inverse);
-    if (!(b.error < simple))
-        b = (ebpo_bounded){ 0, simple };
-    b.error = b.error * ENLARGE + TINY;
-    return b.error < n->most && fabs(b.middle) <= 2 * n->most ? b : unknown;
+    bool has_slope = t->second_order && q->radius > 0;
+    ebpo_bounded b = unknown;
+    if (at->gap > DISTANCE_MIN && at->d < DISTANCE_MAX) {
+        double inverse = 1 / (at->gap * at->gap), simple = n->area * inverse / 2;
+        b = t->second_order ? bound_second_order(n, q, at, inverse, slope)
+                            : bound_first_order(n, q, at, inverse);
+        if (!(b.error < simple)) {
+            b = (ebpo_bounded){ 0, simple };
+            has_slope = false;
+        }
+        b.error = b.error * ENLARGE + TINY;
+        if (!(b.error < n->most && fabs(b.middle) <= 2 * n->most)) {
+            b = unknown;
+            has_slope = false;
+        }
+    } else
+        has_slope = false;
+    if (!has_slope && q->radius > 0)
+        slope[0] = slope[1] = slope[2] = 0;
+    return b;
 }
 
 static ebpo_bounded bound_node(const ebpo_cap_tree *t, const ebpo_cap_node *n,
-                               const ebpo_cap_box *q)
+                               const ebpo_cap_box *q, double slope[3])
 {
     const placed at = place_ball(n, q);
-    return bound_placed(t, n, q, &at);
+    return bound_placed(t, n, q, &at, slope);
 }
 
 /* Bounds the half angle of a stretch's triangle at a point. Computes in 512 bits if doubles do not
@@ -221,7 +248,7 @@ ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], d
         uint32_t entry = stack[--count];
         const ebpo_cap_node *n = &tree->node[entry & ~EBPO_CAP_TRIANGLE];
         bool triangle = entry & EBPO_CAP_TRIANGLE;
-        ebpo_bounded b = triangle ? bound_triangle(tree, n, p) : bound_node(tree, n, &q);
+        ebpo_bounded b = triangle ? bound_triangle(tree, n, p) : bound_node(tree, n, &q, NULL);
         if (triangle || b.error <= tolerance)
             add_bounded(&sum, b);
         else
@@ -232,12 +259,48 @@ ebpo_bounded ebpo_cap_tree_bound(const ebpo_cap_tree *tree, const double p[3], d
 
 /* --- lists --- */
 
+static inline void add_slope(double sum[3], const double term[3])
+{
+    for (int k = 0; k < 3; k++)
+        sum[k] += term[k];
+}
+
+/* Expresses the same bounds with another centre. */
+static void move_field(ebpo_cap_field *f, const double centre[3])
+{
+    double most = 0, sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double term = f->slope[k] * (centre[k] - f->centre[k]);
+        f->centre[k] = centre[k];
+        most += fabs(term);
+        sum += term;
+    }
+    if (most > 0) {
+        f->at_centre.middle += sum;
+        f->at_centre.error += 0x1p-48 * (fabs(f->at_centre.middle) + most + f->at_centre.error);
+    }
+}
+
+bool ebpo_cap_field_add(ebpo_cap_field *sum, const ebpo_cap_tree *tree, const ebpo_cap_box *box,
+                        uint32_t entry, double error)
+{
+    ebpo_cap_node own;
+    double slope[3];
+    ebpo_bounded b = bound_node(tree, node_of(tree, entry, &own), box, slope);
+    if (!(b.error <= error))
+        return false;
+    add_bounded(&sum->at_centre, b);
+    add_slope(sum->slope, slope);
+    return true;
+}
+
 ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tree,
                                   const ebpo_cap_box *box, uint64_t begin, uint64_t end,
-                                  uint64_t most, ebpo_bounded *far)
+                                  uint64_t most, ebpo_cap_field *far)
 {
     uint32_t stack[STACK];
     uint64_t before = lists->count;
+    move_field(far, box->centre);
     if (begin < end)
         ebpo_cap_list_prefetch(tree, lists->entry + begin, end - begin);
     for (uint64_t i = begin; i < end; i++) {
@@ -249,10 +312,12 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
             const ebpo_cap_node *n = node_of(tree, entry, &own);
             const placed at = place_ball(n, box);
             ebpo_bounded b = { 0, n->most };
+            double slope[3];
             if (n->radius + box->radius <= FAR * at.gap)
-                b = bound_placed(tree, n, box, &at);
+                b = bound_placed(tree, n, box, &at, slope);
             if (b.error < n->most) {
-                add_bounded(far, b);
+                add_bounded(&far->at_centre, b);
+                add_slope(far->slope, slope);
             } else if (n->radius > box->radius && has_parts(tree, entry)) {
                 count += find_parts(tree, entry, stack + count);
             } else {
@@ -272,32 +337,42 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
 
 /* --- refined sums --- */
 
-static ebpo_bounded bound_entry(const ebpo_cap_front *f, uint32_t entry)
+static ebpo_bounded bound_entry(const ebpo_cap_front *f, uint32_t entry, double slope[3])
 {
     ebpo_cap_node own;
-    return bound_node(f->tree, node_of(f->tree, entry, &own), &f->box);
+    return bound_node(f->tree, node_of(f->tree, entry, &own), &f->box, slope);
+}
+
+/* Adds an entry to the front. */
+static void add_entry(ebpo_cap_front *f, uint32_t entry)
+{
+    f->entry[f->count] = entry;
+    f->bound[f->count] = bound_entry(f, entry, f->slope[f->count]);
+    f->count++;
 }
 
 void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, const ebpo_cap_box *box,
-                          const uint32_t *entry, uint64_t count, ebpo_bounded far)
+                          const uint32_t *entry, uint64_t count, const ebpo_cap_field *far)
 {
     front->tree = tree;
     front->box = *box;
-    front->done = far;
+    front->done = far->at_centre;
+    ebpo_vec3_copy(far->slope, front->done_slope);
     front->count = 0;
     front->touched = count > EBPO_CAP_FRONT;
     ebpo_cap_list_prefetch(tree, entry, count);
     for (uint64_t i = 0; i < count; i++) {
-        bool triangle = box->radius == 0 && entry[i] & EBPO_CAP_TRIANGLE;
-        ebpo_bounded b =
-            triangle ? bound_triangle(tree, &tree->node[entry[i] & ~EBPO_CAP_TRIANGLE], box->centre)
-                     : bound_entry(front, entry[i]);
-        if (front->touched || triangle) {
-            add_bounded(&front->done, b);
-            continue;
+        double slope[3];
+        if (box->radius == 0 && entry[i] & EBPO_CAP_TRIANGLE) {
+            const ebpo_cap_node *n = &tree->node[entry[i] & ~EBPO_CAP_TRIANGLE];
+            add_bounded(&front->done, bound_triangle(tree, n, box->centre));
+        } else if (!front->touched) {
+            add_entry(front, entry[i]);
+        } else {
+            add_bounded(&front->done, bound_entry(front, entry[i], slope));
+            if (box->radius > 0)
+                add_slope(front->done_slope, slope);
         }
-        front->entry[front->count] = entry[i];
-        front->bound[front->count++] = b;
     }
 }
 
@@ -305,19 +380,30 @@ void ebpo_cap_front_begin_all(ebpo_cap_front *front, const ebpo_cap_tree *tree,
                               const ebpo_cap_box *box)
 {
     const uint32_t root = 0;
-    ebpo_cap_front_begin(front, tree, box, &root, tree->node_count > 0, (ebpo_bounded){ 0, 0 });
+    const ebpo_cap_field none = { .at_centre = { 0, 0 } };
+    ebpo_cap_front_begin(front, tree, box, &root, tree->node_count > 0, &none);
 }
 
-ebpo_bounded ebpo_cap_front_sum(const ebpo_cap_front *front, bool *apart)
+ebpo_cap_sum ebpo_cap_front_sum(const ebpo_cap_front *front)
 {
-    ebpo_bounded sum = front->done;
-    *apart = !front->touched;
+    ebpo_cap_sum sum = { front->done, 0, !front->touched };
+    bool point = front->box.radius == 0;
+    double slope[3], reach = 0;
+    ebpo_vec3_copy(front->done_slope, slope);
     for (uint32_t i = 0; i < front->count; i++) {
         const ebpo_cap_node *n = &front->tree->node[front->entry[i] & ~EBPO_CAP_TRIANGLE];
         double most = front->entry[i] & EBPO_CAP_TRIANGLE ? n->weight * EBPO_PI_LOW : n->most;
-        *apart = *apart && front->bound[i].error < most;
-        add_bounded(&sum, front->bound[i]);
+        sum.apart = sum.apart && front->bound[i].error < most;
+        add_bounded(&sum.all, front->bound[i]);
+        if (!point)
+            add_slope(slope, front->slope[i]);
     }
+    if (point)
+        return sum;
+    for (int k = 0; k < 3; k++)
+        reach += fabs(slope[k]) * front->box.half[k];
+    sum.spread = reach * (1 - 0x1p-30) - sum.all.error;
+    sum.all.error += reach * ENLARGE;
     return sum;
 }
 
@@ -328,6 +414,8 @@ static void refine_entry(ebpo_cap_front *f, uint32_t i)
     f->count--;
     f->entry[i] = f->entry[f->count];
     f->bound[i] = f->bound[f->count];
+    if (f->box.radius > 0)
+        ebpo_vec3_copy(f->slope[f->count], f->slope[i]);
     if (has_parts(f->tree, entry))
         count = find_parts(f->tree, entry, part);
     else /* The node has one triangle, and the box is a point. For points, bound_triangle is more
@@ -338,8 +426,7 @@ static void refine_entry(ebpo_cap_front *f, uint32_t i)
             const ebpo_cap_node *n = &f->tree->node[part[k] & ~EBPO_CAP_TRIANGLE];
             add_bounded(&f->done, bound_triangle(f->tree, n, f->box.centre));
         } else {
-            f->entry[f->count] = part[k];
-            f->bound[f->count++] = bound_entry(f, part[k]);
+            add_entry(f, part[k]);
         }
     }
 }

@@ -21,13 +21,15 @@ static int is_small(ebpo_bounded angles, double threshold)
 int ebpo_cap_front_small(ebpo_cap_front *front, double threshold, double variation, int steps,
                          uint64_t *terms)
 {
-    bool apart;
     int small;
     do {
-        ebpo_bounded b = ebpo_cap_front_sum(front, &apart);
+        ebpo_cap_sum sum = ebpo_cap_front_sum(front);
         *terms += front->count;
-        b.error += variation;
-        small = is_small(b, threshold);
+        sum.all.error += variation;
+        small = is_small(sum.all, threshold);
+        if (small < 0 && sum.spread > 0) /* |w_D| may be certainly greater at some points */
+            small = is_small((ebpo_bounded){ fabs(sum.all.middle) + sum.spread, 0 }, threshold) ? -1
+                                                                                                : 0;
     } while (small < 0 && steps-- > 0 && ebpo_cap_front_refine(front));
     return small;
 }
@@ -35,23 +37,27 @@ int ebpo_cap_front_small(ebpo_cap_front *front, double threshold, double variati
 int ebpo_cap_front_result(ebpo_cap_front *front, const ebpo_cap_rule *rule, int32_t winding,
                           double variation, uint64_t *terms)
 {
-    bool apart;
     int result;
     do {
-        ebpo_bounded b = ebpo_cap_front_sum(front, &apart);
+        ebpo_cap_sum sum = ebpo_cap_front_sum(front);
+        ebpo_bounded b = sum.all;
         *terms += front->count;
         b.error += fmax(variation, 0);
         b = ebpo_cap_winding_of(b, winding);
-        result = apart || variation >= 0
+        result = sum.apart || variation >= 0
                      ? ebpo_cap_rule_result(rule, b.middle - b.error, b.middle + b.error)
                      : -1;
+        double spread = sum.spread / (2 * EBPO_PI_LOW);
+        if (result < 0 && sum.apart && spread > 0 &&
+            ebpo_cap_rule_result(rule, b.middle - spread, b.middle + spread) < 0)
+            return EBPO_CAP_BOTH;
     } while (result < 0 && ebpo_cap_front_refine(front));
     return result;
 }
 
 int ebpo_cap_small_in(ebpo_cap_front *front, const ebpo_cap_tree *tree, const double low[3],
-                      const double high[3], const uint32_t *entry, uint64_t count, ebpo_bounded far,
-                      double threshold)
+                      const double high[3], const uint32_t *entry, uint64_t count,
+                      const ebpo_cap_field *far, double threshold)
 {
     const ebpo_cap_box box = ebpo_cap_box_of(low, high), centre = ebpo_cap_point(box.centre);
     uint64_t terms = 0;

@@ -184,21 +184,6 @@ static ebpo_cap_decision decide_exactly(const ebpo_cap_tree *tree, const double 
 
 /* --- decisions --- */
 
-/* A front is a set of tree nodes that together have all discs, with their bounds. Refines a front
- * until its bounds decide. Returns 1 (inside) or 0 (outside), or -1 if the finest bounds do not
- * decide. */
-static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_cap_rule *rule,
-                           ebpo_bounded *w)
-{
-    bool apart;
-    int result;
-    do {
-        *w = ebpo_cap_winding_of(ebpo_cap_front_sum(front, &apart), winding);
-        result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);
-    } while (result < 0 && ebpo_cap_front_refine(front));
-    return result;
-}
-
 /* Returns the distance of w from the nearest boundary of the rule. */
 static double boundary_distance(const ebpo_cap_rule *rule, double w)
 {
@@ -206,13 +191,31 @@ static double boundary_distance(const ebpo_cap_rule *rule, double w)
     return fabs(w - nearest_boundary(rule, w, &side));
 }
 
+/* A front is a set of tree nodes that together have all discs, with their bounds. Refines a front
+ * until its bounds decide. Returns 1 (inside) or 0 (outside), or -1 if the finest bounds do not
+ * decide, or if the errors that cannot be refined are too large to decide. */
+static int decide_by_front(ebpo_cap_front *front, int32_t winding, const ebpo_cap_rule *rule,
+                           ebpo_bounded *w)
+{
+    for (;;) {
+        *w = ebpo_cap_winding_of(ebpo_cap_front_sum(front).all, winding);
+        int result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);
+        if (result >= 0)
+            return result;
+        if (boundary_distance(rule, w->middle) < front->done.error * INVERSE_TURN ||
+            !ebpo_cap_front_refine(front))
+            return -1;
+    }
+}
+
 /* Returns 1 (inside) or 0 (outside) if bounds in doubles decide, else -1. Sums with smaller and
- * smaller tolerances, each as small as the distance from the boundary requires. */
+ * smaller tolerances, each as small as the distance from the boundary requires. `first`: the first
+ * tolerance. */
 static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
-                            const ebpo_cap_rule *rule, ebpo_bounded *w)
+                            const ebpo_cap_rule *rule, double first, ebpo_bounded *w)
 {
     int result = -1;
-    for (double t = 0x1p-5; t >= 0 && result < 0;) {
+    for (double t = first; t >= 0 && result < 0;) {
         *w = ebpo_cap_winding_of(ebpo_cap_tree_bound(tree, p, t), winding);
         result = ebpo_cap_rule_result(rule, w->middle - w->error, w->middle + w->error);
         double wanted = t / 2 * boundary_distance(rule, w->middle) / w->error;
@@ -221,25 +224,54 @@ static int decide_by_bounds(const ebpo_cap_tree *tree, const double p[3], int32_
     return result;
 }
 
-ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
-                                  const ebpo_cap_rule *rule)
+/* The tolerance of a first sum without an estimate of w. */
+static const double FIRST_TOLERANCE = 0x1p-5;
+
+/* Decides by sums over the whole tree, and then by numbers of 512 bits. `first`: the tolerance of
+ * the first sum. */
+static ebpo_cap_decision decide_by_tree(const ebpo_cap_tree *tree, const double p[3],
+                                        int32_t winding, const ebpo_cap_rule *rule, double first)
 {
     ebpo_bounded w;
-    int result = decide_by_bounds(tree, p, winding, rule, &w);
+    int result = decide_by_bounds(tree, p, winding, rule, first, &w);
     return result >= 0 ? (ebpo_cap_decision){ result, false, w }
                        : decide_exactly(tree, p, winding, rule);
 }
 
+ebpo_cap_decision ebpo_cap_decide(const ebpo_cap_tree *tree, const double p[3], int32_t winding,
+                                  const ebpo_cap_rule *rule)
+{
+    return decide_by_tree(tree, p, winding, rule, FIRST_TOLERANCE);
+}
+
+/* Returns the bounds of a field at the point x. */
+static ebpo_cap_field field_at(const ebpo_near_field *f, const double x[3])
+{
+    ebpo_cap_field out = { .at_centre = { (double)f->middle, (double)f->error } };
+    for (int k = 0; k < 3; k++)
+        out.at_centre.middle += (double)f->slope[k] * (2 * x[k] - 1);
+    return out;
+}
+
 ebpo_cap_decision ebpo_cap_decide_near(const ebpo_cap_tree *tree, const ebpo_near_cell *cell,
-                                       const uint32_t *disc, const double p[3], int32_t winding,
-                                       const ebpo_cap_rule *rule)
+                                       const uint32_t *disc, const double p[3], const double x[3],
+                                       int32_t winding, const ebpo_cap_rule *rule)
 {
     const ebpo_cap_box point = ebpo_cap_point(p);
+    const ebpo_cap_field far = field_at(&cell->far, x), most = field_at(&cell->most, x);
     ebpo_cap_front front;
     ebpo_bounded w;
-    ebpo_cap_front_begin(&front, tree, &point, disc, cell->count,
-                         (ebpo_bounded){ (double)cell->far_middle, (double)cell->far_error });
+    ebpo_cap_front_begin(&front, tree, &point, disc, cell->nearest, &most);
     int result = decide_by_front(&front, winding, rule, &w);
-    return result >= 0 ? (ebpo_cap_decision){ result, false, w }
-                       : ebpo_cap_decide(tree, p, winding, rule);
+    if (result < 0 && cell->nearest < cell->count) {
+        ebpo_cap_front_begin(&front, tree, &point, disc, cell->count, &far);
+        result = decide_by_front(&front, winding, rule, &w);
+    }
+    if (result >= 0)
+        return (ebpo_cap_decision){ result, false, w };
+    /* The error of a sum is about proportional to the tolerance to the power of 0.7. This tolerance
+     * most often gives an error just below the distance. */
+    double distance = boundary_distance(rule, w.middle),
+           first = fmax(fmin(distance * sqrt(distance) / 4, FIRST_TOLERANCE), 0x1p-41);
+    return decide_by_tree(tree, p, winding, rule, first);
 }

@@ -446,7 +446,7 @@ static bool faces_decide(const ebpo_lod_model *model, ebpo_cell cell)
     ebpo_cell_bounds(&model->box, cell, low, high);
     return model->has_caps &&
            ebpo_cap_small_in(&front, &model->caps, low, high, &root, model->caps.node_count > 0,
-                             (ebpo_bounded){ 0, 0 }, threshold) == 1;
+                             &(ebpo_cap_field){ .at_centre = { 0, 0 } }, threshold) == 1;
 }
 
 ebpo_status ebpo_lod_leaf_planes(const ebpo_lod_model *model, ebpo_cell cell, uint64_t leaf,

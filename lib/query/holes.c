@@ -89,7 +89,7 @@ typedef struct marking {
  */
 typedef struct near_discs {
     uint64_t begin, end; /* the list: marking.lists.entry[begin .. end - 1] */
-    ebpo_bounded far;    /* sum of the half angles (2 pi w_D) of the far discs */
+    ebpo_cap_field far;  /* sum of the half angles (2 pi w_D) of the far discs */
     bool decided;        /* the rule for k decides in the whole cell */
     int32_t record;      /* of a gray node: index of an ebpo_near_cell for its leaves, or -1 */
 } near_discs;
@@ -105,7 +105,7 @@ static ebpo_cap_box box_of(const marking *w, ebpo_cell cell)
 static void begin_front(marking *w, const ebpo_cap_box *box, const near_discs *near)
 {
     ebpo_cap_front_begin(&w->front, &w->holes->caps, box, w->lists.entry + near->begin,
-                         near->end - near->begin, near->far);
+                         near->end - near->begin, &near->far);
 }
 
 /* Returns true if a single disc of the list is large compared with the box. */
@@ -162,7 +162,7 @@ static bool begin_at_centre(marking *w, const ebpo_cap_box *box, const near_disc
     *variation = ebpo_cap_variation(&w->holes->caps, box, list, count, EBPO_PI_LOW);
     if (*variation == INFINITY)
         return false;
-    ebpo_cap_front_begin(&w->front, &w->holes->caps, &centre, list, count, near->far);
+    ebpo_cap_front_begin(&w->front, &w->holes->caps, &centre, list, count, &near->far);
     return true;
 }
 
@@ -184,7 +184,8 @@ static int find_result(marking *w, ebpo_cell cell, const ebpo_cap_box *box, cons
     double variation, low[3], high[3];
     begin_front(w, box, near);
     int result = ebpo_cap_front_result(&w->front, &w->holes->rule, winding, -1, &w->terms);
-    if (result >= 0 || !has_large_disc(w, box, near) || !begin_at_centre(w, box, near, &variation))
+    if (result >= 0 || result == EBPO_CAP_BOTH || !has_large_disc(w, box, near) ||
+        !begin_at_centre(w, box, near, &variation))
         return result;
     ebpo_cell_bounds(w->m->box, cell, low, high);
     winding += cross_near(w, near, low, box->centre);
@@ -242,6 +243,46 @@ static void shrink_array(void *array, uint64_t count, size_t size)
         memcpy(array, &shrunk, sizeof shrunk);
 }
 
+/* Copies the list of near discs to `out`: first the entries that may touch the cell, then the
+ * others with large errors in the cell, then those with small errors. Sets cell->touching and
+ * cell->nearest, the numbers of entries of the first kind, and of the first and second kind. Adds
+ * the bounds of the others to *most. */
+static void copy_list(const marking *w, const ebpo_cap_box *box, const double low[3],
+                      const double high[3], const near_discs *near, uint32_t *out,
+                      ebpo_near_cell *cell, ebpo_cap_field *most)
+{
+    const double small = 0x1p-2; /* 1/25 of a turn */
+    const ebpo_cap_tree *caps = &w->holes->caps;
+    uint32_t touching = 0, count = 0, end = (uint32_t)(near->end - near->begin);
+    for (uint64_t i = near->begin; i < near->end; i++) {
+        uint32_t entry = w->lists.entry[i];
+        if (ebpo_cap_list_near(caps, &entry, 1, low, high)) {
+            out[count++] = out[touching];
+            out[touching++] = entry;
+        } else if (ebpo_cap_field_add(most, caps, box, entry, small)) {
+            out[--end] = entry;
+        } else {
+            out[count++] = entry;
+        }
+    }
+    cell->touching = touching < EBPO_TOUCHING_ALL ? (uint8_t)touching : EBPO_TOUCHING_ALL;
+    cell->nearest = (uint16_t)count;
+}
+
+/* Converts bounds to the coordinates of a cell with this box. */
+static ebpo_near_field to_near_field(const ebpo_cap_field *f, const ebpo_cap_box *box)
+{
+    ebpo_near_field out = { .middle = (float)f->at_centre.middle };
+    double error = f->at_centre.error + fabs((double)out.middle - f->at_centre.middle);
+    for (int k = 0; k < 3; k++) {
+        double slope = f->slope[k] * box->half[k];
+        out.slope[k] = (float)slope;
+        error += fabs((double)out.slope[k] - slope) + 0x1p-28 * fabs(slope);
+    }
+    out.error = (float)error * (1 + 0x1p-22f) + 0x1p-100f;
+    return out;
+}
+
 /* Adds an ebpo_near_cell to the table. Returns its index, or -1 if there is no space. */
 static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, int32_t winding)
 {
@@ -252,17 +293,18 @@ static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, in
         !grow_in_quota(w, &t->near, &w->near_capacity, t->near_count + 1, sizeof *t->near) ||
         !grow_in_quota(w, &t->disc, &w->disc_capacity, t->disc_count + count, sizeof *t->disc))
         return -1;
-    if (count)
-        memcpy(t->disc + t->disc_count, w->lists.entry + near->begin, count * sizeof *t->disc);
-    float middle = (float)near->far.middle;
-    double error = near->far.error + fabs((double)middle - near->far.middle);
-    t->near[t->near_count] = (ebpo_near_cell){ middle,
-                                               (float)error * (1 + 0x1p-22f) + 0x1p-100f,
-                                               winding,
-                                               (uint32_t)t->disc_count,
-                                               (uint16_t)count,
-                                               caps_touch(w, cell, near),
-                                               (uint8_t)cell.level };
+    const ebpo_cap_box box = box_of(w, cell);
+    ebpo_near_cell made = { .winding = winding,
+                            .first = (uint32_t)t->disc_count,
+                            .count = (uint16_t)count,
+                            .level = (uint8_t)cell.level };
+    ebpo_cap_field most = near->far;
+    double low[3], high[3];
+    ebpo_cell_bounds(w->m->box, cell, low, high);
+    copy_list(w, &box, low, high, near, t->disc + t->disc_count, &made, &most);
+    made.far = to_near_field(&near->far, &box);
+    made.most = to_near_field(&most, &box);
+    t->near[t->near_count] = made;
     t->disc_count += count;
     return (int32_t)t->near_count++;
 }
@@ -406,11 +448,29 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_di
     }
 }
 
+/* Replaces the entries of split uniform nodes in the grid by those of their parts. */
+static void paint_parts(ebpo_node_table *t)
+{
+    uint32_t side = t->grid ? 1u << t->grid_bits : 0, at[3];
+    uint64_t i = 0;
+    for (at[2] = 0; at[2] < side; at[2]++)
+        for (at[1] = 0; at[1] < side; at[1]++)
+            for (at[0] = 0; at[0] < side; at[0]++, i++) {
+                int level = t->grid_depth[i];
+                if (ebpo_entry_kind_of(t->grid[i]) != EBPO_ENTRY_UNIFORM)
+                    continue;
+                int32_t marked = ebpo_marked_part(t, ebpo_entry_winding(t->grid[i]), at,
+                                                  t->grid_bits, t->grid_bits, &level);
+                if (ebpo_entry_uniform(marked, &t->grid[i]))
+                    t->grid_depth[i] = (uint8_t)level;
+            }
+}
+
 ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, ebpo_error *error)
 {
     ebpo_node_table *table = marked->table;
     marking *w = ebpo_alloc_zero(1, sizeof *w);
-    near_discs all = { 0, 0, { 0, 0 }, false, -1 };
+    near_discs all = { .record = -1 };
     if (!w)
         return ebpo_fail_memory(error, sizeof *w);
     w->holes = holes;
@@ -436,6 +496,7 @@ ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, 
         table->grid_depth = NULL;
         table->grid_bits = 0;
         ebpo_node_table_make_grid(table);
+        paint_parts(table);
     }
     return fits ? EBPO_OK
                 : ebpo_fail(error, EBPO_E_LIMIT, "the winding number of a node is beyond 2^25");
@@ -472,15 +533,17 @@ int32_t ebpo_holes_list_crossings(const ebpo_holes *holes, const ebpo_node_table
                                   const double p[3])
 {
     int32_t sum = 0;
-    ebpo_cap_list_prefetch(&holes->caps, table->disc + cell->first, cell->count);
-    for (uint32_t i = 0; i < cell->count; i++)
+    uint32_t count = ebpo_near_touching(cell);
+    ebpo_cap_list_prefetch(&holes->caps, table->disc + cell->first, count);
+    for (uint32_t i = 0; i < count; i++)
         sum += ebpo_cap_path_crossings(&holes->caps, table->disc[cell->first + i], low, p);
     return sum;
 }
 
 ebpo_where ebpo_holes_where_in(ebpo_holes *holes, const ebpo_node_table *table,
-                               const ebpo_near_cell *cell, const double p[3], int32_t winding)
+                               const ebpo_near_cell *cell, const double p[3], const double x[3],
+                               int32_t winding)
 {
-    return where_of(holes, ebpo_cap_decide_near(&holes->caps, cell, table->disc + cell->first, p,
+    return where_of(holes, ebpo_cap_decide_near(&holes->caps, cell, table->disc + cell->first, p, x,
                                                 winding, &holes->rule));
 }

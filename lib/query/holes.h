@@ -81,12 +81,12 @@ static inline ebpo_uniform_mark ebpo_entry_mark(int32_t marked)
 static inline int32_t ebpo_marked_value(int32_t marked) { return (marked - (marked & 7)) / 8; }
 
 /* Returns the marked entry of the part of a cell that contains the position `at` of level `fine`.
- * On entry, `marked` and *level are the cell's marked entry and level; on return, *level is the
- * part's level. */
+ * Goes down to the level `last` only. On entry, `marked` and *level are the cell's marked entry and
+ * level; on return, *level is the part's level. */
 static inline int32_t ebpo_marked_part(const ebpo_node_table *table, int32_t marked,
-                                       const uint32_t at[3], int fine, int *level)
+                                       const uint32_t at[3], int fine, int last, int *level)
 {
-    while (ebpo_entry_mark(marked) == EBPO_MARK_SPLIT)
+    while (ebpo_entry_mark(marked) == EBPO_MARK_SPLIT && *level < last)
         marked = table->split[ebpo_marked_value(marked)][ebpo_octant_at(at, fine - ++*level)];
     return marked;
 }
@@ -103,9 +103,11 @@ int32_t ebpo_holes_list_crossings(const ebpo_holes *holes, const ebpo_node_table
 
 /* ebpo_holes_where and ebpo_holes_where_in classify a point that is on no face. `winding` is the
  * winding number, at the point, of the closed mesh of surface and caps. ebpo_holes_where_in is
- * faster, but the point must be in `cell`. */
+ * faster, but the point must be in `cell`. x: the point in the cell's coordinates, 0 .. 1 on each
+ * axis, with an error of at most 2^-30. */
 ebpo_where ebpo_holes_where(ebpo_holes *holes, const double p[3], int32_t winding);
 ebpo_where ebpo_holes_where_in(ebpo_holes *holes, const ebpo_node_table *table,
-                               const ebpo_near_cell *cell, const double p[3], int32_t winding);
+                               const ebpo_near_cell *cell, const double p[3], const double x[3],
+                               int32_t winding);
 
 #endif

@@ -72,25 +72,34 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 
 /* A point in a leaf's cell. */
 typedef struct leaf_point {
-    ebpo_cell leaf;     /* the leaf's cell */
-    double xi[3];       /* coordinates in the cell, 0 .. 1; the error is at most 2^-30 */
-    const uint32_t *at; /* [3] the cell of the deepest level that contains the point */
+    ebpo_cell leaf; /* the leaf's cell */
+    double xi[3];   /* coordinates in the cell, 0 .. 1; the error is at most 2^-30 */
+    const ebpo_position *position;
     uint32_t sixteenth; /* coordinates in sixteenths of the cell, eight bits for each axis, as the
                          * lower sides in ebpo_listed_block */
 } leaf_point;
+
+/* Computes the coordinates of a position in the cell of this level, 0 .. 1 on each axis. */
+static inline void find_coordinates(int deepest, int level, const ebpo_position *position,
+                                    double x[3])
+{
+    int up = deepest - level;
+    double size = ebpo_half_power(up);
+    for (int k = 0; k < 3; k++)
+        x[k] = (position->cells[k] - (double)(position->at[k] >> up << up)) * size;
+}
 
 /* Finds the position of a point in the cell of its leaf. `level`: level of the leaf. */
 static inline void find_leaf_point(int deepest, int level, const ebpo_position *position,
                                    leaf_point *out)
 {
     int up = deepest - level;
-    double size = ebpo_half_power(up);
     out->leaf.level = level;
-    out->at = position->at;
+    out->position = position;
     out->sixteenth = 0;
+    find_coordinates(deepest, level, position, out->xi);
     for (int k = 0; k < 3; k++) {
         out->leaf.at[k] = position->at[k] >> up;
-        out->xi[k] = (position->cells[k] - (double)(out->leaf.at[k] << up)) * size;
         int at = (int)(out->xi[k] * EBPO_LISTED_CELLS); /* rounding may give 16 */
         out->sixteenth |= (uint32_t)(at < 15 ? at : 15) << 8 * k;
     }
@@ -256,14 +265,16 @@ static inline void inside_beyond_root(const ebpo_context *context, const double 
 /* Decides a point of a cell near the border. `cell`: the record of the cell, which makes the
  * decision faster, or NULL. `winding`: winding number of surface and caps at the point. */
 static void decide_near(const ebpo_context *context, const ebpo_node_table *table,
-                        const ebpo_near_cell *cell, int32_t winding, const double p[3],
-                        ebpo_inside_result *out)
+                        const ebpo_near_cell *cell, int32_t winding, const ebpo_position *position,
+                        const double p[3], ebpo_inside_result *out)
 {
+    double x[3];
     if (context->undecided || !cell) {
         decide_capped(context, p, winding, out);
         return;
     }
-    ebpo_where where = ebpo_holes_where_in(context->model->holes, table, cell, p, winding);
+    find_coordinates(context->model->locator.level, cell->level, position, x);
+    ebpo_where where = ebpo_holes_where_in(context->model->holes, table, cell, p, x, winding);
     *out = (ebpo_inside_result){ (int32_t)where, where == EBPO_IN, 0 };
 }
 
@@ -275,8 +286,9 @@ static void decide_in_leaf(const ebpo_context *context, const ebpo_accel *s,
                            int32_t winding, ebpo_inside_result *out)
 {
     int level = at->leaf.level;
-    int32_t marked = ebpo_marked_part(&s->nodes, (int32_t)leaf->rows, at->at,
-                                      context->model->locator.level, &level);
+    int32_t marked =
+        ebpo_marked_part(&s->nodes, (int32_t)leaf->rows, at->position->at,
+                         context->model->locator.level, context->model->locator.level, &level);
     const ebpo_holes *holes = context->model->holes;
     const ebpo_near_cell *cell = NULL;
     ebpo_uniform_mark mark = ebpo_entry_mark(marked);
@@ -294,7 +306,7 @@ static void decide_in_leaf(const ebpo_context *context, const ebpo_accel *s,
     if (mark == EBPO_MARK_OUT)
         give_winding(context, winding, out);
     else
-        decide_near(context, &s->nodes, cell, winding, p, out);
+        decide_near(context, &s->nodes, cell, winding, at->position, p, out);
 }
 
 /* Decides a point in a leaf by counting crossings. */
@@ -363,7 +375,7 @@ static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
 {
     int deepest = context->model->locator.level;
     int32_t marked =
-        ebpo_marked_part(table, ebpo_entry_winding(entry), position->at, deepest, &level);
+        ebpo_marked_part(table, ebpo_entry_winding(entry), position->at, deepest, deepest, &level);
     ebpo_uniform_mark mark = ebpo_entry_mark(marked);
     const ebpo_box box = ebpo_model_box(context->model);
     const ebpo_holes *holes = context->model->holes;
@@ -379,14 +391,14 @@ static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
         winding = near->winding;
         level = near->level;
     }
-    if (!near || near->touched) {
+    if (!near || near->touching) {
         ebpo_cell cell = ebpo_cell_ancestor(
             (ebpo_cell){ deepest, { position->at[0], position->at[1], position->at[2] } }, level);
         ebpo_cell_bounds(&box, cell, low, high);
         winding += near ? ebpo_holes_list_crossings(holes, table, near, low, p)
                         : ebpo_holes_crossings(holes, low, p);
     }
-    decide_near(context, table, near, winding, p, out);
+    decide_near(context, table, near, winding, position, p, out);
 }
 
 /* Classifies a point in a white or black node of a table. */

@@ -423,16 +423,38 @@ START_TEST(test_centre_of_three_cube_faces_is_a_tie)
 }
 END_TEST
 
+/* Checks the bounds of a box at its point p: `far`, with the bounds of entries that have a small
+ * error in the box, and the other entries. */
+static void check_slopes(judge *j, const holed *h, ebpo_cap_front *front, const ebpo_cap_box *box,
+                         const ebpo_cap_field *far, const uint32_t *entry, uint64_t count,
+                         const double p[3])
+{
+    const ebpo_cap_box point = ebpo_cap_point(p);
+    uint32_t *others = malloc((count + 1) * sizeof *others);
+    uint64_t other_count = 0;
+    ebpo_cap_field sum = *far;
+    for (uint64_t i = 0; i < count; i++)
+        if (!ebpo_cap_field_add(&sum, &h->tree, box, entry[i], 0.25))
+            others[other_count++] = entry[i];
+    for (int k = 0; k < 3; k++)
+        sum.at_centre.middle += sum.slope[k] * (p[k] - box->centre[k]);
+    sum.at_centre.error += 1e-14 * (1 + fabs(sum.at_centre.middle));
+    ebpo_cap_front_begin(front, &h->tree, &point, others, other_count, &sum);
+    do
+        check_contains(j, ebpo_cap_front_sum(front).all, "point of a box");
+    while (ebpo_cap_front_refine(front));
+    free(others);
+}
+
 /* Checks the bounds of boxes around p, each in the one before, against the value at p. */
 static void check_boxes(judge *j, const holed *h, const double q[3], const double half[3],
                         const double p[3])
 {
     ebpo_cap_lists lists = { NULL, NULL, 0, 0 };
     ebpo_cap_front *front = malloc(sizeof *front);
-    ebpo_bounded far = { 0, 0 };
+    ebpo_cap_field far = { .at_centre = { 0, 0 } };
     uint64_t begin = 0, end = h->tree.node_count > 0;
     double low[3], high[3];
-    bool apart;
     lists.entry = calloc(lists.capacity = 1, sizeof *lists.entry);
     lists.count = end;
     for (int k = 0; k < 3; k++) {
@@ -446,15 +468,17 @@ static void check_boxes(judge *j, const holed *h, const double q[3], const doubl
                          EBPO_OK);
         begin = end;
         end = lists.count;
-        ebpo_cap_front_begin(front, &h->tree, &box, lists.entry + begin, end - begin, far);
+        ebpo_cap_front_begin(front, &h->tree, &box, lists.entry + begin, end - begin, &far);
         do
-            check_contains(j, ebpo_cap_front_sum(front, &apart), "list of a box");
+            check_contains(j, ebpo_cap_front_sum(front).all, "list of a box");
         while (ebpo_cap_front_refine(front));
+        check_slopes(j, h, front, &box, &far, lists.entry + begin, end - begin, p);
         ebpo_cap_front_begin_all(front, &h->tree, &box);
         do
-            check_contains(j, ebpo_cap_front_sum(front, &apart), "box");
+            check_contains(j, ebpo_cap_front_sum(front).all, "box");
         while (ebpo_cap_front_refine(front));
-        ck_assert(!apart || !ebpo_caps_near(&h->tree, low, high) || front->stuck >= 3);
+        ck_assert(!ebpo_cap_front_sum(front).apart || !ebpo_caps_near(&h->tree, low, high) ||
+                  front->stuck >= 3);
         for (int k = 0; k < 3; k++) {
             low[k] = low[k] / 2 + p[k] / 2;
             high[k] = high[k] / 2 + p[k] / 2;

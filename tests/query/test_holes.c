@@ -761,6 +761,31 @@ START_TEST(test_levels_agree_or_are_undecided)
 }
 END_TEST
 
+/* Checks that few caps of the lists of cells near the border are the nearest or touch the cell, so
+ * that queries visit few caps; that the errors of far caps are small; and that the grid has the
+ * marks of parts of white nodes. */
+static void check_lists(const ebpo_node_table *t)
+{
+    double error = 0;
+    uint64_t entries = 0, nearest = 0, touching = 0, split = 0,
+             cells = UINT64_C(1) << 3 * t->grid_bits;
+    for (uint32_t i = 0; i < t->near_count; i++) {
+        entries += t->near[i].count;
+        nearest += t->near[i].nearest;
+        touching += ebpo_near_touching(&t->near[i]);
+        error += (double)t->near[i].far.error;
+    }
+    for (uint64_t i = 0; i < cells; i++)
+        split += ebpo_entry_kind_of(t->grid[i]) == EBPO_ENTRY_UNIFORM &&
+                 ebpo_entry_mark(ebpo_entry_winding(t->grid[i])) == EBPO_MARK_SPLIT &&
+                 t->grid_depth[i] < t->grid_bits;
+    ck_assert_msg(3 * nearest < entries && 10 * touching < entries,
+                  "%llu nearest and %llu touching of %llu entries", (unsigned long long)nearest,
+                  (unsigned long long)touching, (unsigned long long)entries);
+    ck_assert_uint_eq(split, 0);
+    ck_assert_double_lt(error / t->near_count, 0.1);
+}
+
 /* Marks take most of the time to open a surface with many holes; the number of terms of their sums
  * does not depend on the machine. */
 START_TEST(test_marks_take_few_terms)
@@ -779,6 +804,7 @@ START_TEST(test_marks_take_few_terms)
     uint64_t terms = h.model->holes->terms;
     ck_assert_msg(terms > leaves && terms < TERMS_OF_LEAF * leaves, "%llu terms for %llu leaves",
                   (unsigned long long)terms, (unsigned long long)leaves);
+    check_lists(&h.model->whole->nodes);
     holed_free(&h);
 }
 END_TEST
