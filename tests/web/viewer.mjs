@@ -1083,7 +1083,13 @@ async function drawsSurface(browser, address) {
   assert.ok(stats.surface.pixels > 0 && stats.surface.pixels < 16, `${stats.surface.pixels}`);
   assert.match(await page.textContent('#shown'), /^Surface within [\d.]+ px \([\d.e-]+\)/);
   assert.ok(bytes < 0.8 * statSync(join(models, 'large.ebpo.h5')).size, `${bytes}`);
-  const drawn = await brightness(page);
+  const drawn = await brightness(page), sides = () => page.evaluate(() => ['fronts', 'backs', 'both'][window.ebpoViewer.scene.look.faces.side]);
+  assert.equal(await sides(), 'fronts');
+  await page.keyboard.press('x'); // a clipping plane
+  await settled(page);
+  assert.equal(await sides(), 'both');
+  for (let i = 0; i < 3; i++)
+    await page.keyboard.press('x');
   await page.selectOption('#detail', '0');
   assert.equal((await settled(page)).stats.meshTriangles, 280134);
   assert.equal(await page.textContent('#shown'), 'The faces of the model');
@@ -1101,6 +1107,7 @@ async function drawsSurface(browser, address) {
   // Levels and their colours show envelopes; the surface returns.
   await page.keyboard.press('k');
   assert.equal((await settled(page)).stats.surface, undefined);
+  assert.equal(await sides(), 'both');
   await page.selectOption('#detail', '16');
   for (const key of ['k', 'k', 'v', 'z', 'w'])
     await page.keyboard.press(key);

@@ -168,6 +168,7 @@ const handlers = {
     showStats(scene.cellFaces);
   },
   tiles(m) {
+    scene.isClosed = state.info.closed && m.stats?.surface !== undefined;
     scene.setTiles(m.set, m.removed);
     if (m.set.length) {
       if (state.shownAfter === undefined)
