@@ -168,7 +168,7 @@ async function compare(page, { stats, calls }) {
     delivered: () => delivered } : undefined;
   const c = await comparePicture(page, resolve(options.mesh), join(viewer, 'node_modules'), tiles), { inside, partly, holes } = c.silhouette;
   console.log(`  settled: ${stats.triangles} triangles, ${calls} draw calls, error ${stats.surface?.pixels.toFixed(2)} pixels; SSIM with all ${c.faces} faces ${c.ssim.toFixed(4)}; ` +
-    `of ${inside} pixels inside the silhouette ${holes} show the background only, ${partly} in part, ${c.cracks} without backs of faces; ` +
+    `of ${inside} pixels inside the silhouette ${holes} show the background only, ${partly} in part; ` +
     `processor time of a frame ${c.frames.own.toFixed(3)} s, of a plain mesh of as many triangles ${c.frames.fronts.toFixed(3)} s, of its both sides ${c.frames.both.toFixed(3)} s; ` +
     `load ${loadavg()[0].toFixed(1)}`);
   for (const { error, ms, bytes, triangles, tiles: count, ssim } of c.others)

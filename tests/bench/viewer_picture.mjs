@@ -98,13 +98,6 @@ const read = () => {
   return { width: gl.drawingBufferWidth, data: btoa(text) };
 };
 
-// Draws only fronts: through a crack, the background is visible.
-const fronts = (on) => {
-  const { faces } = window.ebpoViewer.scene.look;
-  faces.side = on ? 0 : 2;
-  faces.needsUpdate = true;
-};
-
 const showMesh = async ({ address, count }) => {
   const { scene } = window.ebpoViewer, { tiles } = scene, tag = tiles.meshes[0].geometry.attributes.tag.array.slice(0, 4);
   scene.setTiles([], [...tiles.byKey.keys()]);
@@ -119,7 +112,7 @@ const showMesh = async ({ address, count }) => {
 };
 
 // Makes a plain mesh of three.js with the triangles that the viewer has drawn, in a picture of the same size. Sets window.drawFrames: functions that draw a number of frames and
-// wait until they are drawn: the viewer's, those of the plain mesh with fronts of faces alone, the default, and those with both sides, as the viewer draws.
+// wait until they are drawn: the viewer's, those of the plain mesh with fronts of faces alone, the default, and those with both sides.
 const preparePlain = async (address) => {
   const { scene } = window.ebpoViewer, THREE = await import(`${address}three.module.js`), { canvas, camera } = scene;
   const renderer = new THREE.WebGLRenderer({ canvas: document.createElement('canvas'), antialias: true, powerPreference: 'high-performance', preserveDrawingBuffer: true });
@@ -276,9 +269,6 @@ export async function comparePicture(page, path, packages, tiles) {
   };
   try {
     const drawn = await picture();
-    await page.evaluate(fronts, true);
-    const front = await picture();
-    await page.evaluate(fronts, false);
     await page.evaluate(preparePlain, address);
     const frames = await timeFrames(page);
     await page.evaluate(showMesh, { address, count: Math.ceil(mesh.faces.length / 3 / TILE_FACES) });
@@ -291,8 +281,7 @@ export async function comparePicture(page, path, packages, tiles) {
       const before = tiles.delivered(), made = await page.evaluate(([url, most]) => window.drawTiles(url, most), [tiles.url, error]), bytes = tiles.delivered() - before;
       others.push({ error, ...made, bytes, ssim: similarity(pixels, (await picture()).pixels, width) });
     }
-    return { others, ssim: similarity(pixels, drawn.pixels, width), silhouette: uncovered(pixels, drawn.pixels, width), cracks: uncovered(pixels, front.pixels, width).partly,
-      faces: mesh.faces.length / 3, frames };
+    return { others, ssim: similarity(pixels, drawn.pixels, width), silhouette: uncovered(pixels, drawn.pixels, width), faces: mesh.faces.length / 3, frames };
   } finally {
     server.close();
   }

@@ -168,6 +168,7 @@ const handlers = {
     showStats(scene.cellFaces);
   },
   tiles(m) {
+    scene.isClosed = state.info.closed && m.stats?.surface !== undefined;
     scene.setTiles(m.set, m.removed);
     if (m.set.length) {
       if (state.shownAfter === undefined)
@@ -259,7 +260,8 @@ function requestCut() {
     black: scene.cut !== undefined, lines: $('wire').checked, cells: $('cells').checked, caps: $('caps').checked } });
 }
 
-// Automatic detail begins with 16 pixels. When this detail is complete, it changes to 8 pixels if frames are fast, and to 32 pixels if frames are slow.
+// Automatic detail begins with 16 pixels. When this detail is complete, it changes to 32 pixels if frames are slow. If they are fast, envelopes change to 8 pixels; a
+// surface, which is similar to the model at 16 pixels, does not: it would need twice the bytes.
 const AUTO = { first: 16, fast: 8, fastMs: 30, slow: 32, slowMs: 150, frames: 4 };
 const detail = () => ($('detail').value === 'auto' ? state.auto : Number($('detail').value));
 
@@ -270,9 +272,12 @@ function refineMore() {
     scene.redraw();
     return;
   }
-  if (frameMs() > AUTO.fastMs && frameMs() < AUTO.slowMs)
+  if (frameMs() >= AUTO.slowMs)
+    state.auto = AUTO.slow;
+  else if (frameMs() <= AUTO.fastMs && !state.stats?.surface)
+    state.auto = AUTO.fast;
+  else
     return;
-  state.auto = frameMs() <= AUTO.fastMs ? AUTO.fast : AUTO.slow;
   requestCut();
 }
 
@@ -549,7 +554,7 @@ window.ebpoViewer = {
   get state() {
     return { idle: state.idle, depth: state.depth, stats: state.stats, traffic: state.traffic, timeline: state.timeline, shownAfter: state.shownAfter, probe: state.probe,
       error: state.error, line: state.line,
-      levels: state.info?.levels.length, cellFaces: scene.cellFaces, calls: state.calls, box: state.box, measured: state.measured };
+      levels: state.info?.levels.length, cellFaces: scene.cellFaces, calls: state.calls, detail: detail(), box: state.box, measured: state.measured };
   },
   get place() {
     return state.scene;

@@ -14,6 +14,7 @@ export const kit = {
 };
 
 const PICK_ROUNDING = 1e-6; // of a picked point: drawn triangles have coordinates in single precision
+const OUTSIDE = 1.05; // all of a model is nearer to the origin
 const PAUSE_MS = 30; // a frame that is requested later after the last one does not measure the interval of frames
 const TURN = Math.PI / 24, MOVE = 0.06; // steps of the keys: radians, and shares of the distance
 
@@ -37,6 +38,7 @@ export class Scene {
     this.look = makeLook();
     this.uniforms = this.look.uniforms;
     this.tiles = new Tiles(this.scene, this.look);
+    this.isClosed = false; // true when the tiles are one closed surface, of which no back is visible from outside
     this.pipeline = undefined; // { render(scene), resize(scene) } draws instead of the renderer, if present
     this.#warmUp();
     this.#makeProbe();
@@ -336,8 +338,9 @@ export class Scene {
     this.requested = undefined;
     this.controls.update(); // damping and the turntable request the next frame
     const distance = this.camera.position.length();
-    this.camera.near = Math.max(0.0005, (distance - 1.05) * 0.5);
+    this.camera.near = Math.max(0.0005, (distance - OUTSIDE) * 0.5);
     this.camera.far = distance + 1.5;
+    this.look.faces.side = this.isClosed && !this.cut && distance > OUTSIDE ? THREE.FrontSide : THREE.DoubleSide; // backs would take a quarter of the time
     this.camera.updateProjectionMatrix();
     if (this.probe.visible) {
       const size = this.camera.position.distanceTo(this.probeAt) * 0.008;

@@ -100,7 +100,9 @@ export class Surface {
         see(child);
     };
     see(0);
-    const urgency = (size, block) => (size > allowed ? 1e9 * (100 + Math.floor(Math.log2(size / (allowed || 1)) / 2)) + (block === undefined ? size : sums.get(block)) : size);
+    const fraction = (size) => size / (1 + size); // from 0 to 1, in the order of sizes
+    const power = (size) => Math.max(0, Math.floor(Math.log2(size / (allowed || 1)) / 2));
+    const urgency = (size, block) => (size > allowed ? 1 + power(size) + fraction(block === undefined ? size : sums.get(block)) : fraction(size));
     const offer = (patch, parent) => {
       const found = seen.get(patch);
       heap.push({ ...found, patch, parent, px: urgency(found.size, this.block[patch]) });

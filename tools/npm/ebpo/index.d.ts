@@ -48,6 +48,8 @@ export interface Info {
   contentSha256: string;
   version: [number, number];
   solid: boolean; pruned: boolean; hasMesh: boolean;
+  /** True for a closed 2-manifold of one component and positive volume: unless faces intersect, the outside is in front of all faces. */
+  outward: boolean;
   /** True if coordinates are doubles. */
   doubles: boolean;
   /** contentSha256 of the original of a subset. */

@@ -267,6 +267,12 @@ static ebpo_status put_attributes(ebpo_js_object *object)
     return status == EBPO_OK ? put_text(object, "],") : status;
 }
 
+/* Returns true if the outside of the mesh is in front of all faces, unless they intersect. */
+static bool is_outward(const ebpo_mesh_report *report)
+{
+    return report->manifold && report->components == 1 && report->volume > 0;
+}
+
 static const char *const rule_words[] = { "nonzero", "evenodd", "positive" };
 
 /* Puts the file's information into array 0, as JSON in UTF-8. */
@@ -286,10 +292,11 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
         put_hash(object, "contentSha256", info->content_sha256) == EBPO_OK &&
         (!info->pruned || put_hash(object, "subsetOf", info->subset_of) == EBPO_OK) &&
         put_text(object,
-                 "\"version\":[%d,%d],\"solid\":%s,\"pruned\":%s,"
+                 "\"version\":[%d,%d],\"solid\":%s,\"outward\":%s,\"pruned\":%s,"
                  "\"hasMesh\":%s,\"doubles\":%s,",
                  info->version_major, info->version_minor, info->solid ? "true" : "false",
-                 info->pruned ? "true" : "false", info->parts & EBPO_PART_MESH ? "true" : "false",
+                 is_outward(&info->report) ? "true" : "false", info->pruned ? "true" : "false",
+                 info->parts & EBPO_PART_MESH ? "true" : "false",
                  info->double_coordinates ? "true" : "false") == EBPO_OK &&
         put_vector(object, "origin", info->box_origin) == EBPO_OK &&
         put_vector(object, "size", info->box_size) == EBPO_OK &&

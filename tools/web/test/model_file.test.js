@@ -36,6 +36,14 @@ test('nodes by parts are those of whole levels', async () => {
   }
 });
 
+test('backs of faces are hidden only behind one shell that is oriented outwards', { skip: !generated.length }, async () => {
+  const closed = { ring: true, cube: true, ring_box: false, cavity: false, overlapping_cubes: false, inside_out_cube: false, mobius: false };
+  for (const [name, expected] of Object.entries(closed)) {
+    const path = generated.find((file) => file.endsWith(`/${name}.ebpo.h5`));
+    assert.equal((await openModel(readFileSync(path), { name })).info.closed, expected, name);
+  }
+});
+
 // A text of a face, equal for each first corner.
 function faceKey(corners) {
   const texts = [0, 3, 6].map((k) => corners.slice(k, k + 3).join(' ')), first = texts.indexOf([...texts].sort()[0]);
