@@ -241,12 +241,15 @@ typedef struct ebpo_inside_kernels {
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
-enum { EBPO_RAY_PACKET = 8 }; /* maximum number of rays of walk_many */
+/* Maximum number of rays of walk_many, and of similar rays among them that are walked as a packet.
+ */
+enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8 };
 typedef struct ebpo_ray_kernels {
     void (*walk)(ebpo_ray_search *search);
-    /* Walks through one accel for one or more searches, which all want the first hit. Searches with
-     * similar origins and directions are done together. */
-    void (*walk_many)(ebpo_ray_search *const *search, unsigned count);
+    /* Walks through one accel for one or more searches, which all want the first hit or all want
+     * any hit. Rays with similar origins and directions, one after another, share the visits of
+     * nodes; other rays take turns. `stack`: space, [count][EBPO_VISITS_MAX]. */
+    void (*walk_many)(ebpo_ray_search *const *search, unsigned count, ebpo_visit *stack);
 } ebpo_ray_kernels;
 
 EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)

@@ -287,7 +287,7 @@ EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
     const char *node = (const char *)(s->bound + number),
                *faces = (const char *)ebpo_accel_meshlet(s, number),
                *at = child & EBPO_IS_BLOCK ? faces : node;
-    for (int i = 0; i < (wide ? 4 : 2); i++)
+    for (int i = 0; i < (wide ? 4 : 3); i++)
         __builtin_prefetch(at + 64 * i);
 }
 
@@ -328,9 +328,19 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
     return b->child[__builtin_ctz(lanes)];
 }
 
+/* Returns one of the children `lanes`, and pushes the others. `sorted`: visits nearer children
+ * first, which is faster if the limit decreases during the walk. */
+EBPO_EIGHT uint32_t ray_enter(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
+                              const ebpo_bound *b, unsigned lanes, f8 enter, bool wide, bool sorted)
+{
+    if (!(lanes & (lanes - 1)))
+        return b->child[__builtin_ctz(lanes)];
+    return sorted ? ray_nearest(s, stack, top, b, lanes, enter, wide)
+                  : ray_next(s, stack, top, b, lanes, wide);
+}
+
 /* Walks through a child of the hierarchy (as in ebpo_bound). `stack`: space for the visits.
- * `sorted`: visits nearer children first, which is faster if the limit decreases during the walk.
- */
+ * `sorted`: see ray_enter. */
 EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack, bool wide,
                             bool sorted)
 {
@@ -348,12 +358,7 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stac
             unsigned lanes = ray_children(r, b, &enter);
             if (!lanes)
                 break;
-            if (!(lanes & (lanes - 1)))
-                child = b->child[__builtin_ctz(lanes)];
-            else if (sorted)
-                child = ray_nearest(s, stack, &top, b, lanes, enter, wide);
-            else
-                child = ray_next(s, stack, &top, b, lanes, wide);
+            child = ray_enter(s, stack, &top, b, lanes, enter, wide, sorted);
         }
         if (child & EBPO_IS_BLOCK)
             ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
@@ -374,20 +379,14 @@ static void ray_walk_from(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack)
         ray_walk_in(r, begin, stack, false, false);
 }
 
-/* Walks through the accel with a search whose fields for boxes and faces are set. */
-static void ray_walk_alone(ebpo_ray_search *r, ebpo_visit *stack)
-{
-    ray_walk_from(r, r->s->root_bound, stack);
-    if (r->wants == EBPO_WANTS_FIRST)
-        drop_beyond(r);
-}
-
 static void ray_walk(ebpo_ray_search *r)
 {
     ebpo_visit stack[EBPO_VISITS_MAX];
     ray_set_boxes(r);
     ray_set_faces(r);
-    ray_walk_alone(r, stack);
+    ray_walk_from(r, r->s->root_bound, stack);
+    if (r->wants == EBPO_WANTS_FIRST)
+        drop_beyond(r);
 }
 
 /* --- packets: several rays walked together --- */
@@ -605,29 +604,108 @@ EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stac
             top = packet_push(s, stack, top, child, lanes, enter, wide);
         }
     }
-    for (unsigned i = 0; i < p->count; i++)
-        drop_beyond(p->ray[i]);
 }
 
-static void ray_walk_many(ebpo_ray_search *const *ray, unsigned count)
+/* --- turns: several rays walked in turns --- */
+
+/* The walk of a ray that takes turns with other rays. Between its turns, the memory that the ray
+ * needs next is fetched. */
+typedef struct ray_turn {
+    ebpo_ray_search *r;
+    ebpo_visit *stack; /* [EBPO_VISITS_MAX] */
+    uint32_t top;      /* number of visits on the stack */
+    uint32_t next;     /* the child to visit at the next turn */
+} ray_turn;
+
+/* Visits children until the ray needs a child that is not prefetched yet, and prefetches it.
+ * Returns false if the walk is complete. */
+EBPO_EIGHT bool ray_take_turn(ray_turn *w, bool wide, bool sorted)
+{
+    ebpo_ray_search *r = w->r;
+    const ebpo_accel *s = r->s;
+    uint32_t top = w->top, child = w->next;
+    for (;;) {
+        if (child & EBPO_IS_BLOCK) {
+            ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
+        } else {
+            f8 enter;
+            const ebpo_bound *b = &s->bound[child];
+            unsigned lanes = ray_children(r, b, &enter);
+            if (lanes) {
+                w->next = ray_enter(s, w->stack, &top, b, lanes, enter, wide, sorted);
+                w->top = top;
+                ray_fetch(s, w->next, wide);
+                return true;
+            }
+        }
+        do {
+            if (top == 0 || r->done)
+                return false;
+            child = (uint32_t)w->stack[--top];
+        } while (sorted && ebpo_visit_key(w->stack[top]) > r->bound);
+    }
+}
+
+/* Walks through the accel with rays that take turns. `stack`: [count][EBPO_VISITS_MAX]. */
+EBPO_EIGHT void ray_walk_in_turns(ebpo_ray_search *const *ray, unsigned count, ebpo_visit *stack,
+                                  bool wide, bool sorted)
+{
+    ray_turn turn[EBPO_RAY_GROUP];
+    for (unsigned i = 0; i < count; i++)
+        turn[i] =
+            (ray_turn){ ray[i], stack + (size_t)i * EBPO_VISITS_MAX, 0, ray[i]->s->root_bound };
+    for (unsigned i = 0; count; i = i < count ? i : 0) {
+        if (ray_take_turn(&turn[i], wide, sorted))
+            i++;
+        else
+            turn[i] = turn[--count];
+    }
+}
+
+/* --- a group of rays --- */
+
+/* Walks with at most EBPO_RAY_PACKET rays as a packet. Returns false if they are not similar. */
+static bool ray_walk_packet(ebpo_ray_search *const *ray, unsigned count, ebpo_visit *stack)
 {
     ray_packet p;
-    ebpo_visit stack[EBPO_VISITS_MAX];
-    for (unsigned i = 0; i < count; i++) {
-        ray_set_boxes(ray[i]);
-        ray_set_faces(ray[i]);
-    }
     const ebpo_accel *s = ray[0]->s;
-    if (s->root_bound & EBPO_IS_BLOCK || !packet_is_coherent(ray, count)) {
-        for (unsigned i = 0; i < count; i++)
-            ray_walk_alone(ray[i], stack);
-        return;
-    }
+    if (ray[0]->wants != EBPO_WANTS_FIRST || s->root_bound & EBPO_IS_BLOCK ||
+        !packet_is_coherent(ray, count))
+        return false;
     packet_set(&p, ray, count);
     if (s->wide)
         packet_walk(&p, s, stack, true);
     else
         packet_walk(&p, s, stack, false);
+    return true;
+}
+
+static void ray_walk_many(ebpo_ray_search *const *ray, unsigned count, ebpo_visit *stack)
+{
+    ebpo_ray_search *other[EBPO_RAY_GROUP];
+    unsigned others = 0;
+    bool wide = ray[0]->s->wide, sorted = ray[0]->wants == EBPO_WANTS_FIRST;
+    for (unsigned i = 0; i < count; i++) {
+        ray_set_boxes(ray[i]);
+        ray_set_faces(ray[i]);
+    }
+    for (unsigned i = 0; i < count; i += EBPO_RAY_PACKET) {
+        unsigned part = count - i < EBPO_RAY_PACKET ? count - i : EBPO_RAY_PACKET;
+        if (ray_walk_packet(ray + i, part, stack))
+            continue;
+        for (unsigned k = 0; k < part; k++)
+            other[others++] = ray[i + k];
+    }
+    if (wide && sorted)
+        ray_walk_in_turns(other, others, stack, true, true);
+    else if (wide)
+        ray_walk_in_turns(other, others, stack, true, false);
+    else if (sorted)
+        ray_walk_in_turns(other, others, stack, false, true);
+    else
+        ray_walk_in_turns(other, others, stack, false, false);
+    for (unsigned i = 0; i < count && sorted; i++)
+        drop_beyond(ray[i]);
 }
 
 const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };

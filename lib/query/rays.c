@@ -440,6 +440,17 @@ static bool begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
     return ray_search_begin(r, s);
 }
 
+/* Ends a search after the kernel's walk. */
+static void end_search(ebpo_ray_search *r)
+{
+    casting *c = r->user;
+    judge_waiting(r);
+    if (r->any_hit) {
+        c->count = 1;
+        c->done = true;
+    }
+}
+
 /* Searches the faces of a subtree or of the whole model. */
 static void cast_subtree(casting *c, const ebpo_accel *s)
 {
@@ -447,11 +458,7 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     if (!begin_search(c, &r, s))
         return;
     c->context->model->kernels.ray->walk(&r);
-    judge_waiting(&r);
-    if (r.any_hit) {
-        c->count = 1;
-        c->done = true;
-    }
+    end_search(&r);
 }
 
 /* Returns true if the ray may enter the node's cell before its limit (conservative). *enter,
@@ -651,9 +658,24 @@ static void begin_ray(batch *b, uint64_t i, unsigned worker, casting *c)
                   b->options.sides);
 }
 
-static void store_first(batch *b, uint64_t i, const casting *c)
+/* Stores the result of ray i. */
+static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *c,
+                                ebpo_error *error)
 {
-    b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+    ebpo_status status = EBPO_OK;
+    if (b->wants == EBPO_WANTS_FIRST)
+        b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+    else if (b->wants == EBPO_WANTS_ANY)
+        b->any[i] = c->count;
+    else {
+        found f = { .worker = worker, .begin = b->hit_count[worker] };
+        status = casting_sort(c, f.begin, &f.end, error);
+        b->hit_count[worker] = f.end;
+        b->all[i] = f;
+    }
+    if (status == EBPO_OK && b->options.done)
+        b->options.done[i] = true;
+    return status;
 }
 
 /* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
@@ -666,73 +688,59 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
     c.rounds = rounds;
     ebpo_status status = ray_walk(&c, error);
     *waits = c.waits;
-    if (status != EBPO_OK || c.waits)
-        return status;
-    if (b->wants == EBPO_WANTS_FIRST)
-        store_first(b, i, &c);
-    else if (b->wants == EBPO_WANTS_ANY)
-        b->any[i] = c.count;
-    else {
-        found f = { .worker = worker, .begin = b->hit_count[worker] };
-        status = casting_sort(&c, f.begin, &f.end, error);
-        b->hit_count[worker] = f.end;
-        b->all[i] = f;
-    }
-    if (status == EBPO_OK && b->options.done)
-        b->options.done[i] = true;
-    return status;
+    return status == EBPO_OK && !c.waits ? store_result(b, i, worker, &c, error) : status;
 }
 
-/* Space for rays that are walked together. It is not on the stack, because a query needs less than
- * 64 KiB of it (ebpo/base.h). */
-typedef struct packet {
-    casting c[EBPO_RAY_PACKET];
-    ebpo_ray_search search[EBPO_RAY_PACKET];
-} packet;
+/* Space for rays that are evaluated together. It is not on the stack, because a query needs less
+ * than 64 KiB of it (ebpo/base.h). */
+typedef struct group {
+    casting c[EBPO_RAY_GROUP];
+    ebpo_ray_search search[EBPO_RAY_GROUP];
+    ebpo_visit stack[EBPO_RAY_GROUP * EBPO_VISITS_MAX];
+} group;
 
-/* Finds the first hits of these rays, at most EBPO_RAY_PACKET, in a model that is completely in
- * memory. Results are those of cast_one. */
-static ebpo_status cast_packet(batch *b, packet *p, const uint64_t *ray, unsigned count,
-                               unsigned worker, ebpo_error *error)
+/* Finds the first hits or any hits of these rays, at most EBPO_RAY_GROUP, in a model that is
+ * completely in memory. Results are those of cast_one. */
+static ebpo_status cast_group(batch *b, group *g, const uint64_t *ray, unsigned count,
+                              unsigned worker, ebpo_error *error)
 {
-    ebpo_ray_search *active[EBPO_RAY_PACKET];
+    ebpo_ray_search *active[EBPO_RAY_GROUP];
     const ebpo_model *m = b->context[worker]->model;
     unsigned walking = 0;
     ebpo_status status = EBPO_OK;
     for (unsigned i = 0; i < count; i++) {
-        begin_ray(b, ray[i], worker, &p->c[i]);
-        if (begin_search(&p->c[i], &p->search[i], m->whole))
-            active[walking++] = &p->search[i];
+        begin_ray(b, ray[i], worker, &g->c[i]);
+        if (begin_search(&g->c[i], &g->search[i], m->whole))
+            active[walking++] = &g->search[i];
     }
     if (walking)
-        m->kernels.ray->walk_many(active, walking);
+        m->kernels.ray->walk_many(active, walking, g->stack);
     for (unsigned i = 0; i < walking; i++)
-        judge_waiting(active[i]);
+        end_search(active[i]);
     for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
-        status = ray_end(&p->c[i], EBPO_OK, error);
+        status = ray_end(&g->c[i], EBPO_OK, error);
         if (status == EBPO_OK)
-            store_first(b, ray[i], &p->c[i]);
-        if (status == EBPO_OK && b->options.done)
-            b->options.done[ray[i]] = true;
+            status = store_result(b, ray[i], worker, &g->c[i], error);
     }
     return status;
 }
 
-/* Finds the first hits of the rays begin .. end - 1 in a model that is completely in memory. */
-static ebpo_status cast_packets(batch *b, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+/* Finds the first hits or any hits of the rays begin .. end - 1 in a model that is completely in
+ * memory. */
+static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
-    packet *p = ebpo_alloc(1, sizeof *p);
-    ebpo_status status = p ? EBPO_OK : ebpo_fail_memory(error, sizeof *p);
+    group *g = ebpo_alloc(1, sizeof *g);
+    ebpo_status status = g ? EBPO_OK : ebpo_fail_memory(error, sizeof *g);
     for (uint64_t i = begin; i < end && status == EBPO_OK;) {
-        uint64_t ray[EBPO_RAY_PACKET];
+        uint64_t ray[EBPO_RAY_GROUP];
         unsigned count = 0;
-        for (; i < end && count < EBPO_RAY_PACKET; i++)
+        for (; i < end && count < EBPO_RAY_GROUP; i++)
             if (!b->options.done || !b->options.done[i])
                 ray[count++] = i;
-        status = cast_packet(b, p, ray, count, worker, error);
+        status = cast_group(b, g, ray, count, worker, error);
     }
-    free(p);
+    free(g);
     return status;
 }
 
@@ -834,8 +842,8 @@ static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned
 {
     batch *b = user;
     const ebpo_model *m = b->context[worker]->model;
-    if (m->whole && b->wants == EBPO_WANTS_FIRST)
-        return cast_packets(b, begin, end, worker, error);
+    if (m->whole && b->wants != EBPO_WANTS_ALL)
+        return cast_groups(b, begin, end, worker, error);
     return m->whole || m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
                ? cast_in_order(b, begin, end, worker, error)
                : cast_in_rounds(b, begin, end, worker, error);

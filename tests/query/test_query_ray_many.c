@@ -11,11 +11,23 @@
 #include "query/query_model.h"
 #include "query_support.h"
 
-/* Kernels that count how many sides of boxes they decode for eight children at a time. */
-static uint64_t decoded_sides;
+/* Kernels that count how many sides of boxes they decode for eight children at a time. They also
+ * count descents: visits of nodes of `counted_accel` at once after the visit of the parent. */
+static uint64_t decoded_sides, descents;
+static const ebpo_accel *counted_accel;
+static void count_descent(const uint8_t *x)
+{
+    static const ebpo_bound *last;
+    const ebpo_bound *first = counted_accel->bound;
+    const ebpo_bound *node = first + (size_t)(x - (const uint8_t *)first) / sizeof *first;
+    descents += node != last && first + node->parent == last;
+    last = node;
+}
 EBPO_EIGHT f8 decode_sides(const uint8_t *x)
 {
     decoded_sides++;
+    if (counted_accel)
+        count_descent(x);
     return f8_from_bytes(x);
 }
 #define f8_from_bytes      decode_sides
@@ -254,6 +266,42 @@ START_TEST(test_coherent_rays_share_nodes)
 }
 END_TEST
 
+/* Rays that are not similar take turns, so that memory is fetched for one ray while others are
+ * evaluated: a ray rarely visits a node at once after its parent. */
+START_TEST(test_other_rays_take_turns)
+{
+    enum { RAYS = 640 };
+    static ebpo_ray_hit hits[RAYS];
+    static bool any[RAYS];
+    query_model m;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    ebpo_ray *rays = make_rays(&m, RAYS, 5);
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    uint64_t single[2] = { 0, 0 }, together[2];
+    options.threads = 1;
+    counted_accel = m.context->model->whole;
+    for (int wants = 0; wants < 2; wants++) {
+        descents = 0;
+        for (int i = 0; i < RAYS; i++)
+            ASSERT_OK(wants ? ebpo_ray_any_many(m.context, rays + i, 1, &options, any, error)
+                            : ebpo_ray_first_many(m.context, rays + i, 1, &options, hits, error));
+        single[wants] = descents;
+        descents = 0;
+        ASSERT_OK(wants ? ebpo_ray_any_many(m.context, rays, RAYS, &options, any, error)
+                        : ebpo_ray_first_many(m.context, rays, RAYS, &options, hits, error));
+        together[wants] = descents;
+    }
+    counted_accel = NULL;
+    for (int wants = 0; wants < 2; wants++)
+        ck_assert_msg(single[wants] > 100 && 5 * together[wants] < single[wants],
+                      "%llu descents, single rays %llu", (unsigned long long)together[wants],
+                      (unsigned long long)single[wants]);
+    free(rays);
+    query_model_free(&m);
+}
+END_TEST
+
 /* A ray through a vertex hits all faces around it at the same t. */
 START_TEST(test_hits_at_vertex_need_few_exact_comparisons)
 {
@@ -385,6 +433,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
     tcase_add_test(many, test_coherent_rays_share_nodes);
+    tcase_add_test(many, test_other_rays_take_turns);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
