@@ -90,13 +90,6 @@ static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 
 /* --- one ray through one accel --- */
 
-/* The origin of a ray is moved along the ray towards the faces if the origin is far from the accel.
- * That is so if a coordinate of the origin, in the accel's frame, is greater than this multiple of
- * the accel's largest coordinate. */
-static const double near_enough = 4;
-/* This value is used in place of infinity, because infinity times 0 is NaN. */
-#define BEYOND 0x1p100f
-
 /* --- limits --- */
 
 /* Converts t to the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
@@ -105,8 +98,8 @@ static const double near_enough = 4;
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
 {
     double scaled = t * r->limit_scale;
-    if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)BEYOND))
-        return sign > 0 || t == INFINITY ? BEYOND : -1;
+    if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)EBPO_RAY_BEYOND))
+        return sign > 0 || t == INFINITY ? EBPO_RAY_BEYOND : -1;
     double relative = scaled - r->moved + sign * (0x1p-50 * (scaled + r->moved) + 0x1p-90);
     return (float)(relative + sign * fabs(relative) * 0x1p-22);
 }
@@ -147,7 +140,7 @@ static double to_frame(ebpo_ray_search *r)
         greatest = greater_of(greatest, fabs(r->origin[k]));
     }
     r->limit_scale = s->scale;
-    if (!(longest >= 0x1p-12 && longest <= 0x1p12))
+    if (!(longest >= EBPO_RAY_SHORTEST && longest <= EBPO_RAY_LONGEST))
         scale_direction(r, longest);
     r->moved = 0;
     return greatest;
@@ -197,19 +190,14 @@ static bool move_origin(ebpo_ray_search *r, double *greatest)
     return true;
 }
 
-/* Sets a bound of the error of the origin in the frame. Several steps add an error. The origin is
- * moved, transformed to the frame and back to the model's unit, and split into floats. Small
- * coordinates of the direction are replaced (docs/develop/bounds.md, "A ray against boxes").
- * `greatest`: the largest absolute coordinate of the origin. */
+/* Sets the error of the origin. `greatest`: as in ebpo_ray_error. */
 static void set_error(ebpo_ray_search *r, double greatest)
 {
-    const double *c = r->s->centre;
-    double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * r->s->scale;
-    r->error = 0x1p-45 * (greatest + unit) + 0x1p-55 * r->s->largest_coordinate + 0x1p-53;
+    r->error = ebpo_ray_error(r->s, greatest);
     r->blur = greatest < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
     if (greatest < 0x1p80)
         return;
-    r->error = (double)BEYOND; /* the ray may intersect all boxes */
+    r->error = (double)EBPO_RAY_BEYOND; /* the ray may intersect all boxes */
     memset(r->origin, 0, sizeof r->origin);
 }
 
@@ -246,12 +234,12 @@ static bool ray_search_begin(ebpo_ray_search *r, const ebpo_accel *s)
     if (s->bound_count == 0)
         return false;
     double greatest = to_frame(r);
-    if (!(greatest <= near_enough * s->largest_coordinate) &&
+    if (!(greatest <= EBPO_RAY_NEAR * s->largest_coordinate) &&
         greatest < 0x1p46 * s->largest_coordinate && !move_origin(r, &greatest))
         return false;
     set_error(r, greatest);
     r->surely = frame_t(r, r->ray->t_max, -1);
-    r->bound = BEYOND;
+    r->bound = EBPO_RAY_BEYOND;
     lower_bound(r);
     return true;
 }
@@ -363,28 +351,27 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
 }
 
 /* Returns the same as ray_fault, more slowly. */
-static const char *ray_fault_of(const ebpo_segment *ray)
+static const char *ray_fault_of(const double o[3], const double d[3], double t_max)
 {
     double not_finite = 0, longest = 0; /* not_finite: 0, or NaN if a coordinate is not finite */
     for (int k = 0; k < 3; k++) {
-        not_finite += ray->origin[k] * 0 + ray->direction[k] * 0;
-        longest = fabs(ray->direction[k]) > longest ? fabs(ray->direction[k]) : longest;
+        not_finite += o[k] * 0 + d[k] * 0;
+        longest = fabs(d[k]) > longest ? fabs(d[k]) : longest;
     }
     if (not_finite != 0)
         return "has a coordinate that is not a finite number";
     if (longest == 0)
         return "needs a direction other than (0, 0, 0)";
-    return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
+    return t_max >= 0 ? NULL : "needs a t_max of 0 or more";
 }
 
 /* Returns NULL for a valid ray, otherwise the end of an error message ("the ray ..."). */
-static inline const char *ray_fault(const ebpo_segment *ray)
+static inline const char *ray_fault(const double o[3], const double d[3], double t_max)
 {
-    const double *o = ray->origin, *d = ray->direction;
     double far = fabs(o[0]) + fabs(o[1]) + fabs(o[2]), size = fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
-    if (size > 0 && far + size < INFINITY && ray->t_max >= 0)
+    if (size > 0 && far + size < INFINITY && t_max >= 0)
         return NULL;
-    return ray_fault_of(ray);
+    return ray_fault_of(o, d, t_max);
 }
 
 /* Returns false if the ray misses the box [low, high], enlarged by `slack`, for all t in 0 ..
@@ -571,7 +558,7 @@ static ebpo_status cast_ray(casting *c, ebpo_context *context, const double orig
 {
     casting_begin(c, context, origin, direction, t_max, wants, EBPO_RAY_BOTH);
     ebpo_status status = ebpo_check_mesh(context->model, error);
-    const char *fault = ray_fault(&c->ray);
+    const char *fault = ray_fault(origin, direction, t_max);
     if (fault)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray %s", fault);
     return status == EBPO_OK ? ray_walk(c, error) : status;
@@ -691,36 +678,61 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
     return status == EBPO_OK && !c.waits ? store_result(b, i, worker, &c, error) : status;
 }
 
-/* Space for rays that are evaluated together. It is not on the stack, because a query needs less
- * than 64 KiB of it (ebpo/base.h). */
+/* Rays that are evaluated together. They are not on the stack, because a query needs less than
+ * 64 KiB of it (ebpo/base.h). */
 typedef struct group {
+    batch *b;
+    unsigned worker;
+    ebpo_ray_group rays;
+    uint64_t index[EBPO_RAY_GROUP]; /* indices in the batch */
     casting c[EBPO_RAY_GROUP];
     ebpo_ray_search search[EBPO_RAY_GROUP];
-    ebpo_visit stack[EBPO_RAY_GROUP * EBPO_VISITS_MAX];
+    ebpo_ray_search *begun[EBPO_RAY_GROUP]; /* NULL: the ray misses all faces */
 } group;
 
-/* Finds the first hits or any hits of these rays, at most EBPO_RAY_GROUP, in a model that is
- * completely in memory. Results are those of cast_one. */
-static ebpo_status cast_group(batch *b, group *g, const uint64_t *ray, unsigned count,
-                              unsigned worker, ebpo_error *error)
+/* Begins the search of ray i of a group (ebpo_ray_group.begin). */
+static ebpo_ray_search *begin_of_group(void *user, unsigned i)
 {
-    ebpo_ray_search *active[EBPO_RAY_GROUP];
-    const ebpo_model *m = b->context[worker]->model;
-    unsigned walking = 0;
+    group *g = user;
+    begin_ray(g->b, g->index[i], g->worker, &g->c[i]);
+    if (begin_search(&g->c[i], &g->search[i], g->rays.s))
+        g->begun[i] = &g->search[i];
+    return g->begun[i];
+}
+
+static void add_to_group(group *g, uint64_t ray)
+{
+    unsigned i = g->rays.count++;
+    g->rays.ray[i] = &g->b->rays[ray];
+    g->index[i] = ray;
+    g->begun[i] = NULL;
+}
+
+/* Prefetches the faces' indices that the exact tests of candidates will read. */
+static void fetch_candidates(const group *g)
+{
+    const ebpo_accel *s = g->rays.s;
+    for (unsigned i = 0; i < g->rays.count; i++)
+        for (int k = 0; g->begun[i] && k < g->begun[i]->count; k++)
+            ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, g->begun[i]->waiting[k].slot));
+}
+
+/* Finds the first hits or any hits of a group of one or more rays. Results are those of cast_one.
+ */
+static ebpo_status cast_group(group *g, ebpo_error *error)
+{
     ebpo_status status = EBPO_OK;
-    for (unsigned i = 0; i < count; i++) {
-        begin_ray(b, ray[i], worker, &g->c[i]);
-        if (begin_search(&g->c[i], &g->search[i], m->whole))
-            active[walking++] = &g->search[i];
-    }
-    if (walking)
-        m->kernels.ray->walk_many(active, walking, g->stack);
-    for (unsigned i = 0; i < walking; i++)
-        end_search(active[i]);
-    for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
-        status = ray_end(&g->c[i], EBPO_OK, error);
+    g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
+    fetch_candidates(g);
+    for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
+        casting *c = &g->c[i];
+        if (g->begun[i])
+            end_search(g->begun[i]);
+        else
+            begin_ray(g->b, g->index[i], g->worker, c);
+        status = ray_end(c, EBPO_OK, error);
         if (status == EBPO_OK)
-            status = store_result(b, ray[i], worker, &g->c[i], error);
+            status = store_result(g->b, g->index[i], g->worker, c, error);
     }
     return status;
 }
@@ -731,14 +743,21 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
                                ebpo_error *error)
 {
     group *g = ebpo_alloc(1, sizeof *g);
-    ebpo_status status = g ? EBPO_OK : ebpo_fail_memory(error, sizeof *g);
+    if (!g)
+        return ebpo_fail_memory(error, sizeof *g);
+    g->b = b;
+    g->worker = worker;
+    g->rays.s = b->context[worker]->model->whole;
+    g->rays.wants = b->wants;
+    g->rays.begin = begin_of_group;
+    g->rays.user = g;
+    ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK;) {
-        uint64_t ray[EBPO_RAY_GROUP];
-        unsigned count = 0;
-        for (; i < end && count < EBPO_RAY_GROUP; i++)
+        g->rays.count = 0;
+        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
             if (!b->options.done || !b->options.done[i])
-                ray[count++] = i;
-        status = cast_group(b, g, ray, count, worker, error);
+                add_to_group(g, i);
+        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
     }
     free(g);
     return status;
@@ -887,19 +906,10 @@ static void put_in_order(batch *b, const ebpo_model *m)
 
 /* --- on all cores --- */
 
-static ebpo_segment segment_of(const ebpo_ray *r)
-{
-    ebpo_segment s = { .t_max = r->t_max };
-    memcpy(s.origin, r->origin, sizeof s.origin);
-    memcpy(s.direction, r->direction, sizeof s.direction);
-    return s;
-}
-
 ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error *error)
 {
     for (uint64_t i = 0; i < count; i++) {
-        ebpo_segment ray = segment_of(&rays[i]);
-        const char *fault = ray_fault(&ray);
+        const char *fault = ray_fault(rays[i].origin, rays[i].direction, rays[i].t_max);
         if (fault)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "ray %" PRIu64 " %s", i, fault);
     }

@@ -234,11 +234,28 @@ START_TEST(test_coherent_rays_match_single_rays)
 }
 END_TEST
 
-/* Returns the number of sides that are decoded for rays from one eye through a square of pixels, in
- * calls of `part` rays. */
-static uint64_t count_sides(query_model *m, uint64_t part)
+/* Counts the searches that a group of rays begins. */
+static uint64_t begun;
+static ebpo_ray_search *(*uncounted_begin)(void *user, unsigned i);
+static ebpo_ray_search *counted_begin(void *user, unsigned i)
 {
-    enum { SIDE = 64 };
+    begun++;
+    return uncounted_begin(user, i);
+}
+static void counted_walk_many(ebpo_ray_group *g)
+{
+    uncounted_begin = g->begin;
+    g->begin = counted_begin;
+    ebpo_ray_kernels_counted.walk_many(g);
+    g->begin = uncounted_begin;
+}
+
+enum { SIDE = 64 };
+
+/* Returns the number of sides that are decoded for rays from one eye through SIDE * SIDE pixels, in
+ * calls of `part` rays. *hit: the number of rays with a hit. */
+static uint64_t count_sides(query_model *m, uint64_t part, uint64_t *hit)
+{
     static ebpo_ray rays[SIDE * SIDE];
     static ebpo_ray_hit hits[SIDE * SIDE];
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
@@ -251,6 +268,9 @@ static uint64_t count_sides(query_model *m, uint64_t part)
     decoded_sides = 0;
     for (uint64_t i = 0; i < SIDE * SIDE; i += part)
         ASSERT_OK(ebpo_ray_first_many(m->context, rays + i, part, &options, hits + i, error));
+    *hit = 0;
+    for (int i = 0; i < SIDE * SIDE; i++)
+        *hit += hits[i].face != EBPO_NO_FACE;
     return decoded_sides;
 }
 
@@ -259,9 +279,26 @@ START_TEST(test_coherent_rays_share_nodes)
     query_model m;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
     m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
-    uint64_t single = count_sides(&m, 1), together = count_sides(&m, EBPO_RAY_PACKET);
+    uint64_t hits, single = count_sides(&m, 1, &hits),
+                   together = count_sides(&m, EBPO_RAY_PACKET, &hits);
     ck_assert_msg(together > 0 && 3 * together < single, "%llu sides, single rays %llu",
                   (unsigned long long)together, (unsigned long long)single);
+    query_model_free(&m);
+}
+END_TEST
+
+/* A search is begun only for a ray of a packet that reaches a block. */
+START_TEST(test_coherent_rays_begin_few_searches)
+{
+    const ebpo_ray_kernels kernels = { ebpo_ray_kernels_counted.walk, counted_walk_many };
+    query_model m;
+    uint64_t hits;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &kernels;
+    begun = 0;
+    count_sides(&m, EBPO_RAY_PACKET, &hits);
+    ck_assert_msg(hits <= begun && 4 * begun < 3 * SIDE * SIDE, "%llu searches, %llu hits",
+                  (unsigned long long)begun, (unsigned long long)hits);
     query_model_free(&m);
 }
 END_TEST
@@ -433,6 +470,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
     tcase_add_test(many, test_coherent_rays_share_nodes);
+    tcase_add_test(many, test_coherent_rays_begin_few_searches);
     tcase_add_test(many, test_other_rays_take_turns);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
