@@ -176,7 +176,8 @@ END_TEST
 /* --- coherent rays, which a batch walks through the model together --- */
 
 /* Makes rays that differ from the first one by about `share` of its origin and direction, or of one
- * of these, or of nothing. Some rays end near the hit of the first ray. */
+ * of these, or of nothing. Some origins are far away. Some rays end near the hit of the first ray.
+ */
 static void make_coherent(query_model *m, uint64_t *state, double share, ebpo_ray *rays,
                           unsigned count)
 {
@@ -187,12 +188,15 @@ static void make_coherent(query_model *m, uint64_t *state, double share, ebpo_ra
     for (int k = 0; k < 3; k++)
         if (!isfinite(first->direction[k]))
             first->direction[k] = copysign(1e300, first->direction[k]);
-    ASSERT_OK(ebpo_ray_first(m->context, first->origin, first->direction, first->t_max, &hit,
-                             &found, error));
-    unsigned how = (unsigned)(ebpo_test_random(state) % 4);
     double size = 0;
     for (int k = 0; k < 3; k++)
         size = fmax(size, fabs(first->direction[k]));
+    bool far = ebpo_test_random(state) % 4 == 0;
+    for (int k = 0; k < 3 && far; k++)
+        first->origin[k] -= 8 * m->info.box_size[k] * (first->direction[k] / size);
+    ASSERT_OK(ebpo_ray_first(m->context, first->origin, first->direction, first->t_max, &hit,
+                             &found, error));
+    unsigned how = (unsigned)(ebpo_test_random(state) % 4);
     for (unsigned i = 1; i < count; i++) {
         rays[i] = *first;
         for (int k = 0; k < 3; k++) {
