@@ -267,11 +267,11 @@ typedef struct ebpo_nearest_kernels {
 /* EBPO_RAY_GROUP: maximum number of rays of a group. EBPO_RAY_PACKET: maximum number of similar
  * rays among them that are walked as a packet. */
 enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8 };
-/* Rays through one accel, which all want the first hit or all want any hit. */
+/* Rays through one accel. */
 typedef struct ebpo_ray_group {
     const ebpo_accel *s;
-    ebpo_ray_wants wants;
-    unsigned count; /* at least 1 */
+    ebpo_ray_wants wants; /* of all rays */
+    unsigned count;       /* at least 1 */
     const ebpo_ray *ray[EBPO_RAY_GROUP];
     /* Begins the search of ray i. Returns NULL if the ray misses all faces. Rays whose search is
      * not begun miss all faces. */

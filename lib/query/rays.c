@@ -55,7 +55,7 @@ typedef struct ray_rounds {
 
 /* A query with one ray. */
 typedef struct casting {
-    ebpo_context *context; /* EBPO_WANTS_ALL: the hits are in context->unsorted_hits */
+    ebpo_context *context;
     ebpo_segment ray;
     ebpo_ray_wants wants;
     ebpo_ray_sides sides; /* only hits of these sides of faces count */
@@ -66,6 +66,9 @@ typedef struct casting {
     bool no_memory;
     uint64_t count;       /* number of hits that are kept */
     ebpo_ray_found first; /* EBPO_WANTS_FIRST: the first hit so far, if count > 0 */
+    /* EBPO_WANTS_ALL: an array of the context or of a group of rays with the hits; its capacity */
+    ebpo_ray_found **found;
+    uint64_t *capacity;
 } casting;
 
 static inline void casting_begin(casting *c, ebpo_context *context, const double origin[3],
@@ -81,6 +84,8 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
     c->done = c->waits = c->no_memory = false;
     c->rounds = NULL;
     c->count = 0;
+    c->found = &context->unsorted_hits;
+    c->capacity = &context->found_capacity;
 }
 
 static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
@@ -282,15 +287,13 @@ static void keep_first(casting *c, const ebpo_ray_found *m)
 /* Keeps a hit, if it is wanted. */
 static void casting_keep(casting *c, const ebpo_ray_found *m)
 {
-    ebpo_context *k = c->context;
     if (c->wants == EBPO_WANTS_FIRST) {
         keep_first(c, m);
     } else if (c->wants == EBPO_WANTS_ANY) {
         c->count = 1;
         c->done = true;
-    } else if (ebpo_grow(&k->unsorted_hits, &k->found_capacity, c->count + 1,
-                         sizeof *k->unsorted_hits)) {
-        k->unsorted_hits[c->count++] = *m;
+    } else if (ebpo_grow(c->found, c->capacity, c->count + 1, sizeof **c->found)) {
+        (*c->found)[c->count++] = *m;
     } else {
         c->done = c->no_memory = true;
     }
@@ -342,11 +345,12 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     *end = begin;
     if (!ebpo_grow(&k->hits, &k->hit_capacity, begin + c->count, sizeof *k->hits))
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
-    sort_found(k->unsorted_hits, c->count, &c->ray);
+    const ebpo_ray_found *found = *c->found;
+    sort_found(*c->found, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
         /* A face that several subtrees list may be hit several times. */
-        if (i == 0 || k->unsorted_hits[i].file_face != k->unsorted_hits[i - 1].file_face)
-            k->hits[(*end)++] = hit_of(&k->unsorted_hits[i]);
+        if (i == 0 || found[i].file_face != found[i - 1].file_face)
+            k->hits[(*end)++] = hit_of(&found[i]);
     return EBPO_OK;
 }
 
@@ -688,6 +692,8 @@ typedef struct group {
     casting c[EBPO_RAY_GROUP];
     ebpo_ray_search search[EBPO_RAY_GROUP];
     ebpo_ray_search *begun[EBPO_RAY_GROUP]; /* NULL: the ray misses all faces */
+    ebpo_ray_found *found[EBPO_RAY_GROUP];  /* casting.found */
+    uint64_t capacity[EBPO_RAY_GROUP];
 } group;
 
 /* Begins the search of ray i of a group (ebpo_ray_group.begin). */
@@ -695,6 +701,8 @@ static ebpo_ray_search *begin_of_group(void *user, unsigned i)
 {
     group *g = user;
     begin_ray(g->b, g->index[i], g->worker, &g->c[i]);
+    g->c[i].found = &g->found[i];
+    g->c[i].capacity = &g->capacity[i];
     if (begin_search(&g->c[i], &g->search[i], g->rays.s))
         g->begun[i] = &g->search[i];
     return g->begun[i];
@@ -708,22 +716,17 @@ static void add_to_group(group *g, uint64_t ray)
     g->begun[i] = NULL;
 }
 
-/* Prefetches the faces' indices that the exact tests of candidates will read. */
-static void fetch_candidates(const group *g)
+/* Finds the hits of a group of one or more rays. Results are those of cast_one. */
+static ebpo_status cast_group(group *g, ebpo_error *error)
 {
     const ebpo_accel *s = g->rays.s;
+    ebpo_status status = EBPO_OK;
+    g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
+    /* Prefetches what the exact tests of candidates will read. (gcc omits calls of a separate
+     * function, as it has no result.) */
     for (unsigned i = 0; i < g->rays.count; i++)
         for (int k = 0; g->begun[i] && k < g->begun[i]->count; k++)
             ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, g->begun[i]->waiting[k].slot));
-}
-
-/* Finds the first hits or any hits of a group of one or more rays. Results are those of cast_one.
- */
-static ebpo_status cast_group(group *g, ebpo_error *error)
-{
-    ebpo_status status = EBPO_OK;
-    g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
-    fetch_candidates(g);
     for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
         casting *c = &g->c[i];
         if (g->begun[i])
@@ -737,8 +740,7 @@ static ebpo_status cast_group(group *g, ebpo_error *error)
     return status;
 }
 
-/* Finds the first hits or any hits of the rays begin .. end - 1 in a model that is completely in
- * memory. */
+/* Finds the hits of the rays begin .. end - 1 in a model that is completely in memory. */
 static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
@@ -751,6 +753,8 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
     g->rays.wants = b->wants;
     g->rays.begin = begin_of_group;
     g->rays.user = g;
+    memset(g->found, 0, sizeof g->found);
+    memset(g->capacity, 0, sizeof g->capacity);
     ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK;) {
         g->rays.count = 0;
@@ -759,6 +763,8 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
                 add_to_group(g, i);
         status = g->rays.count ? cast_group(g, error) : EBPO_OK;
     }
+    for (unsigned i = 0; i < EBPO_RAY_GROUP; i++)
+        free(g->found[i]);
     free(g);
     return status;
 }
@@ -861,9 +867,9 @@ static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned
 {
     batch *b = user;
     const ebpo_model *m = b->context[worker]->model;
-    if (m->whole && b->wants != EBPO_WANTS_ALL)
+    if (m->whole)
         return cast_groups(b, begin, end, worker, error);
-    return m->whole || m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
+    return m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
                ? cast_in_order(b, begin, end, worker, error)
                : cast_in_rounds(b, begin, end, worker, error);
 }

@@ -307,37 +307,43 @@ START_TEST(test_coherent_rays_begin_few_searches)
 }
 END_TEST
 
+/* Returns the number of descents of a call for rays. */
+static uint64_t count_descents(query_model *m, ebpo_ray_wants wants, const ebpo_ray *rays,
+                               uint64_t count)
+{
+    static ebpo_ray_hit first[640];
+    static bool any[640];
+    const ebpo_ray_hit *hits;
+    const uint64_t *begin;
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    options.threads = 1;
+    descents = 0;
+    if (wants == EBPO_WANTS_FIRST)
+        ASSERT_OK(ebpo_ray_first_many(m->context, rays, count, &options, first, error));
+    else if (wants == EBPO_WANTS_ANY)
+        ASSERT_OK(ebpo_ray_any_many(m->context, rays, count, &options, any, error));
+    else
+        ASSERT_OK(ebpo_ray_all_many(m->context, rays, count, &options, &hits, &begin, error));
+    return descents;
+}
+
 /* Rays that are not similar take turns, so that memory is fetched for one ray while others are
  * evaluated: a ray rarely visits a node at once after its parent. */
 START_TEST(test_other_rays_take_turns)
 {
     enum { RAYS = 640 };
-    static ebpo_ray_hit hits[RAYS];
-    static bool any[RAYS];
     query_model m;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
     m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
     ebpo_ray *rays = make_rays(&m, RAYS, 5);
-    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
-    uint64_t single[2] = { 0, 0 }, together[2];
-    options.threads = 1;
+    uint64_t single = 0, together;
     counted_accel = m.context->model->whole;
-    for (int wants = 0; wants < 2; wants++) {
-        descents = 0;
-        for (int i = 0; i < RAYS; i++)
-            ASSERT_OK(wants ? ebpo_ray_any_many(m.context, rays + i, 1, &options, any, error)
-                            : ebpo_ray_first_many(m.context, rays + i, 1, &options, hits, error));
-        single[wants] = descents;
-        descents = 0;
-        ASSERT_OK(wants ? ebpo_ray_any_many(m.context, rays, RAYS, &options, any, error)
-                        : ebpo_ray_first_many(m.context, rays, RAYS, &options, hits, error));
-        together[wants] = descents;
-    }
+    for (int i = 0; i < RAYS; i++)
+        single += count_descents(&m, (ebpo_ray_wants)_i, rays + i, 1);
+    together = count_descents(&m, (ebpo_ray_wants)_i, rays, RAYS);
     counted_accel = NULL;
-    for (int wants = 0; wants < 2; wants++)
-        ck_assert_msg(single[wants] > 100 && 5 * together[wants] < single[wants],
-                      "%llu descents, single rays %llu", (unsigned long long)together[wants],
-                      (unsigned long long)single[wants]);
+    ck_assert_msg(single > 100 && 5 * together < single, "%llu descents, single rays %llu",
+                  (unsigned long long)together, (unsigned long long)single);
     free(rays);
     query_model_free(&m);
 }
@@ -475,7 +481,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
     tcase_add_test(many, test_coherent_rays_share_nodes);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
-    tcase_add_test(many, test_other_rays_take_turns);
+    tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
