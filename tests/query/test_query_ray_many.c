@@ -349,6 +349,35 @@ START_TEST(test_other_rays_take_turns)
 }
 END_TEST
 
+/* Rays in the plane of many faces have so many candidates that some are tested during the walk,
+ * between the turns of other rays. */
+START_TEST(test_many_hits_during_turns)
+{
+    enum { RAYS = 16 };
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    const ebpo_ray_hit *hits, *single;
+    const uint64_t *begin;
+    uint64_t count;
+    ebpo_ray rays[RAYS];
+    query_model m, other;
+    query_model_make(&m, "box", ebpo_test_box(low, high, 30), &query_variants[0]);
+    query_model_make(&other, "box", ebpo_test_box(low, high, 30), &query_variants[0]);
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (ebpo_ray){ { -0.3, 0.05 * i, 1 }, { 1, 0.7 - 0.08 * i, 0 }, INFINITY };
+    ASSERT_OK(ebpo_ray_all_many(m.context, rays, RAYS, NULL, &hits, &begin, error));
+    ck_assert_uint_gt(begin[RAYS], EBPO_RAY_CANDIDATES * RAYS / 2);
+    for (int i = 0; i < RAYS; i++) {
+        ASSERT_OK(ebpo_ray_all(other.context, rays[i].origin, rays[i].direction, INFINITY, &single,
+                               &count, error));
+        ck_assert_uint_eq(begin[i + 1] - begin[i], count);
+        for (uint64_t k = 0; k < count; k++)
+            ck_assert(same_hit(&hits[begin[i] + k], &single[k]));
+    }
+    query_model_free(&m);
+    query_model_free(&other);
+}
+END_TEST
+
 /* A ray through a vertex hits all faces around it at the same t. */
 START_TEST(test_hits_at_vertex_need_few_exact_comparisons)
 {
@@ -482,6 +511,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_test(many, test_coherent_rays_share_nodes);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
     tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
+    tcase_add_test(many, test_many_hits_during_turns);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
