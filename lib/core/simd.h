@@ -395,6 +395,33 @@ static inline unsigned v4l_mask(v4l m)
 }
 #endif
 
+EBPO_EIGHT v4d v4d_abs(v4d a) { return (v4d)((v4l)a & INT64_MAX); }
+/* v4d_signed: `a`, which is not negative, with the signs of b. v4d_max and v4d_min return b in
+ * lanes with a NaN. */
+EBPO_EIGHT v4d v4d_signed(v4d a, v4d b) { return (v4d)((v4l)a | ((v4l)b & INT64_MIN)); }
+EBPO_EIGHT v4d v4d_pick(v4l mask, v4d yes, v4d no)
+{
+    return (v4d)(((v4l)yes & mask) | ((v4l)no & ~mask));
+}
+EBPO_EIGHT v4d v4d_max(v4d a, v4d b) { return v4d_pick(a > b, a, b); }
+EBPO_EIGHT v4d v4d_min(v4d a, v4d b) { return v4d_pick(a < b, a, b); }
+/* Returns the greatest of the four doubles. */
+EBPO_EIGHT double v4d_greatest(v4d a)
+{
+    double x = a[0] > a[1] ? a[0] : a[1], y = a[2] > a[3] ? a[2] : a[3];
+    return x > y ? x : y;
+}
+
+/* Returns eight doubles, `low` in lanes 0 to 3, rounded to nearest. */
+EBPO_EIGHT f8 f8_from_doubles(v4d low, v4d high)
+{
+#if defined(EBPO_SIMD_AVX2)
+    return _mm256_set_m128(_mm256_cvtpd_ps((__m256d)high), _mm256_cvtpd_ps((__m256d)low));
+#else
+    return (f8){ { __builtin_convertvector(low, f4), __builtin_convertvector(high, f4) } };
+#endif
+}
+
 #if !defined(__clang__)
 #pragma GCC diagnostic pop
 #endif

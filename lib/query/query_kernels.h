@@ -5,6 +5,8 @@
 #ifndef EBPO_QUERY_QUERY_KERNELS_H
 #define EBPO_QUERY_QUERY_KERNELS_H
 
+#include <ebpo/query.h>
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -140,6 +142,27 @@ static inline void ebpo_near_drop_far(ebpo_near_search *g)
 
 /* --- a ray through one accel --- */
 
+/* The origin of a ray is moved along the ray towards the faces if the origin is far from the accel.
+ * That is so if a coordinate of the origin, in the accel's frame, is greater than this multiple of
+ * the accel's largest coordinate. */
+#define EBPO_RAY_NEAR 4
+/* The direction of a ray is scaled if its longest coordinate is not between 2^-12 and 2^12. */
+#define EBPO_RAY_SHORTEST 0x1p-12
+#define EBPO_RAY_LONGEST  0x1p12
+/* This value of t, in the frame, is used in place of infinity, because infinity times 0 is NaN. */
+#define EBPO_RAY_BEYOND 0x1p100f
+
+/* Returns a bound of the error of the origin in the frame. Several steps add an error. The origin
+ * is moved, transformed to the frame and back to the model's unit, and split into floats. Small
+ * coordinates of the direction are replaced (docs/develop/bounds.md, "A ray against boxes").
+ * `greatest`: the largest absolute coordinate of the origin. */
+static inline double ebpo_ray_error(const ebpo_accel *s, double greatest)
+{
+    const double *c = s->centre;
+    double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * s->scale;
+    return 0x1p-45 * (greatest + unit) + 0x1p-55 * s->largest_coordinate + 0x1p-53;
+}
+
 typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
 
 typedef struct ebpo_ray_search ebpo_ray_search;
@@ -241,12 +264,29 @@ typedef struct ebpo_inside_kernels {
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
-enum { EBPO_RAY_PACKET = 8 }; /* maximum number of rays of walk_many */
+/* EBPO_RAY_GROUP: maximum number of rays of a group. EBPO_RAY_PACKET: maximum number of similar
+ * rays among them that are walked as a packet. */
+enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8 };
+/* Rays through one accel. */
+typedef struct ebpo_ray_group {
+    const ebpo_accel *s;
+    ebpo_ray_wants wants; /* of all rays */
+    unsigned count;       /* at least 1 */
+    const ebpo_ray *ray[EBPO_RAY_GROUP];
+    /* Begins the search of ray i. Returns NULL if the ray misses all faces. Rays whose search is
+     * not begun miss all faces. */
+    ebpo_ray_search *(*begin)(void *user, unsigned i);
+    void *user;
+    /* Space for walk_many. Without the additional visits, the beginnings of all rows would compete
+     * for the same lines of the processor's cache. */
+    ebpo_visit stack[EBPO_RAY_GROUP][EBPO_VISITS_MAX + 24];
+} ebpo_ray_group;
+
 typedef struct ebpo_ray_kernels {
     void (*walk)(ebpo_ray_search *search);
-    /* Walks through one accel for one or more searches, which all want the first hit. Searches with
-     * similar origins and directions are done together. */
-    void (*walk_many)(ebpo_ray_search *const *search, unsigned count);
+    /* Walks with all rays of a group. Rays with similar origins and directions, one after another,
+     * share the visits of nodes; other rays take turns. */
+    void (*walk_many)(ebpo_ray_group *group);
 } ebpo_ray_kernels;
 
 EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)

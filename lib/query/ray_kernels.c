@@ -287,7 +287,7 @@ EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
     const char *node = (const char *)(s->bound + number),
                *faces = (const char *)ebpo_accel_meshlet(s, number),
                *at = child & EBPO_IS_BLOCK ? faces : node;
-    for (int i = 0; i < (wide ? 4 : 2); i++)
+    for (int i = 0; i < (wide ? 4 : 3); i++)
         __builtin_prefetch(at + 64 * i);
 }
 
@@ -328,9 +328,19 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
     return b->child[__builtin_ctz(lanes)];
 }
 
+/* Returns one of the children `lanes`, and pushes the others. `sorted`: visits nearer children
+ * first, which is faster if the limit decreases during the walk. */
+EBPO_EIGHT uint32_t ray_enter(const ebpo_accel *s, ebpo_visit *stack, uint32_t *top,
+                              const ebpo_bound *b, unsigned lanes, f8 enter, bool wide, bool sorted)
+{
+    if (!(lanes & (lanes - 1)))
+        return b->child[__builtin_ctz(lanes)];
+    return sorted ? ray_nearest(s, stack, top, b, lanes, enter, wide)
+                  : ray_next(s, stack, top, b, lanes, wide);
+}
+
 /* Walks through a child of the hierarchy (as in ebpo_bound). `stack`: space for the visits.
- * `sorted`: visits nearer children first, which is faster if the limit decreases during the walk.
- */
+ * `sorted`: see ray_enter. */
 EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack, bool wide,
                             bool sorted)
 {
@@ -348,12 +358,7 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stac
             unsigned lanes = ray_children(r, b, &enter);
             if (!lanes)
                 break;
-            if (!(lanes & (lanes - 1)))
-                child = b->child[__builtin_ctz(lanes)];
-            else if (sorted)
-                child = ray_nearest(s, stack, &top, b, lanes, enter, wide);
-            else
-                child = ray_next(s, stack, &top, b, lanes, wide);
+            child = ray_enter(s, stack, &top, b, lanes, enter, wide, sorted);
         }
         if (child & EBPO_IS_BLOCK)
             ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
@@ -374,23 +379,28 @@ static void ray_walk_from(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack)
         ray_walk_in(r, begin, stack, false, false);
 }
 
-/* Walks through the accel with a search whose fields for boxes and faces are set. */
-static void ray_walk_alone(ebpo_ray_search *r, ebpo_visit *stack)
-{
-    ray_walk_from(r, r->s->root_bound, stack);
-    if (r->wants == EBPO_WANTS_FIRST)
-        drop_beyond(r);
-}
-
 static void ray_walk(ebpo_ray_search *r)
 {
     ebpo_visit stack[EBPO_VISITS_MAX];
     ray_set_boxes(r);
     ray_set_faces(r);
-    ray_walk_alone(r, stack);
+    ray_walk_from(r, r->s->root_bound, stack);
+    if (r->wants == EBPO_WANTS_FIRST)
+        drop_beyond(r);
 }
 
 /* --- packets: several rays walked together --- */
+
+/* Begins the search of ray i of a group. Returns NULL if the ray misses all faces. */
+static ebpo_ray_search *ray_begin(const ebpo_ray_group *g, unsigned i)
+{
+    ebpo_ray_search *r = g->begin(g->user, i);
+    if (r) {
+        ray_set_boxes(r);
+        ray_set_faces(r);
+    }
+    return r;
+}
 
 /* A packet visits the boxes that its *bundle* may intersect. On each axis, the bundle has one
  * origin and one inverse direction for the nearer sides of boxes, and others for the farther sides.
@@ -408,87 +418,94 @@ static void ray_walk(ebpo_ray_search *r)
  * ray walks on alone. Arrays of [4] are those of ebpo_ray_search, for the bundle; arrays of eight
  * floats have a ray in each lane. */
 typedef struct ray_packet {
-    ebpo_ray_search *const *ray; /* [count] */
-    unsigned count;
+    ebpo_ray_group *g;
+    unsigned first, count;                    /* the group's rays first .. first + count - 1 */
+    ebpo_ray_search *search[EBPO_RAY_PACKET]; /* NULL: not begun */
     const uint8_t (*side_at)[3];
     float near_from[4], far_from[4], near_inverse[4], far_inverse[4], near_step[4], far_step[4];
     float bound; /* the greatest bound of all rays */
     float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
 } ray_packet;
 
+/* The rays of a packet in the frame, as in ebpo_ray_search: four in each vector. Unused lanes
+ * repeat another ray. */
+typedef struct packet_frame {
+    v4d origin[3][2], direction[3][2];
+    double error; /* the greatest of all rays */
+} packet_frame;
+
 /* Greatest width of a bundle in an accel, in the frame. Wider packets have no advantage. */
 static const double packet_width = 0.25;
 
-static inline float least_of(float a, float b) { return a < b ? a : b; }
-static inline float greatest_of(float a, float b) { return a > b ? a : b; }
+/* Returns the greatest of eight floats. */
+EBPO_EIGHT float greatest_of(f8 a) { return -f8_least(f8_sub(f8_all(0), a)); }
 
-/* Sets the bundle on one axis. */
-static void packet_set_axis(ray_packet *p, int k)
+/* Sets the rays and the bundle on one axis. */
+EBPO_EIGHT void packet_set_axis(ray_packet *p, int k, bool down, f8 near, f8 far, f8 inverse)
 {
-    bool down = p->inverse[k][0] < 0;
-    float least_near = p->from_near[k][0], most_near = least_near, least_far = p->from_far[k][0],
-          most_far = least_far, least = p->inverse[k][0], most = least;
-    for (unsigned i = 1; i < p->count; i++) {
-        least_near = least_of(least_near, p->from_near[k][i]);
-        most_near = greatest_of(most_near, p->from_near[k][i]);
-        least_far = least_of(least_far, p->from_far[k][i]);
-        most_far = greatest_of(most_far, p->from_far[k][i]);
-        least = least_of(least, p->inverse[k][i]);
-        most = greatest_of(most, p->inverse[k][i]);
-    }
-    p->near_from[k] = down ? least_near : most_near;
-    p->far_from[k] = down ? most_far : least_far;
+    float least = f8_least(inverse), most = greatest_of(inverse);
+    f8_store(p->from_near[k], near);
+    f8_store(p->from_far[k], far);
+    f8_store(p->inverse[k], inverse);
+    p->near_from[k] = down ? f8_least(near) : greatest_of(near);
+    p->far_from[k] = down ? greatest_of(far) : f8_least(far);
     p->near_inverse[k] = p->near_step[k + 1] = down ? most : least;
     p->far_inverse[k] = p->far_step[k + 1] = down ? least : most;
 }
 
 /* Returns true if rays are similar enough to walk together: all directions have the same signs,
  * and the bundle is narrow, all the way to the far end of the accel. */
-static bool packet_is_coherent(ebpo_ray_search *const *ray, unsigned count)
+EBPO_EIGHT bool packet_is_coherent(const packet_frame *f, const ebpo_accel *s)
 {
-    const ebpo_ray_search *first = ray[0];
-    double longest = 0, way = first->s->largest_coordinate, width = 0;
+    double longest = 0, way = s->largest_coordinate;
     for (int k = 0; k < 3; k++) {
-        double d = fabs(first->direction[k]), o = fabs(first->origin[k]);
+        double d = fabs(f->direction[k][0][0]), o = fabs(f->origin[k][0][0]);
         longest = d > longest ? d : longest;
         way = o > way ? o : way;
     }
-    for (unsigned i = 1; i < count; i++) {
-        if (ray[i]->side_at != first->side_at)
-            return false;
-        for (int k = 0; k < 3; k++) {
-            double w = fabs(ray[i]->origin[k] - first->origin[k]) * longest +
-                       fabs(ray[i]->direction[k] - first->direction[k]) * way;
-            width = w > width ? w : width;
-        }
-    }
-    return count > 1 && width < packet_width * longest;
-}
-
-/* Sets the greatest bound of all rays. */
-EBPO_EIGHT void packet_set_bound(ray_packet *p)
-{
-    p->bound = -f8_least(f8_sub(f8_all(0), f8_load(p->bounds)));
-}
-
-/* Sets a packet. Unused lanes have a bound of -1, so they miss all boxes. */
-static void packet_set(ray_packet *p, ebpo_ray_search *const *ray, unsigned count)
-{
-    p->ray = ray;
-    p->count = count;
-    p->side_at = ray[0]->side_at;
-    for (unsigned i = 0; i < 8; i++) {
-        const ebpo_ray_search *r = ray[i < count ? i : 0];
-        for (int k = 0; k < 3; k++) {
-            p->from_near[k][i] = r->near_from[k];
-            p->from_far[k][i] = r->far_from[k];
-            p->inverse[k][i] = r->inverse[k];
-        }
-        p->bounds[i] = i < count ? r->bound : -1;
-    }
-    packet_set_bound(p);
+    v4l similar = ~(v4l){ 0, 0, 0, 0 };
     for (int k = 0; k < 3; k++)
-        packet_set_axis(p, k);
+        for (int h = 0; h < 2; h++) {
+            v4d origin = f->origin[k][h], d = f->direction[k][h],
+                first = v4d_all(f->direction[k][0][0]);
+            similar &= v4d_abs(origin - f->origin[k][0][0]) * longest + v4d_abs(d - first) * way <
+                       packet_width * longest;
+            similar &= ~((v4l)d ^ (v4l)first);
+        }
+    return v4l_mask(similar) == 15;
+}
+
+EBPO_EIGHT void packet_set_bounds(ray_packet *p, f8 bounds)
+{
+    f8_store(p->bounds, bounds);
+    p->bound = greatest_of(bounds);
+}
+
+/* Returns the bounds with another bound of ray i. */
+EBPO_EIGHT f8 packet_with_bound(f8 bounds, unsigned i, float bound)
+{
+    return f8_pick(f8_mask(1u << i), f8_all(bound), bounds);
+}
+
+/* Sets what tests of boxes use (ray_set_boxes), except the bounds. */
+EBPO_EIGHT void packet_set(ray_packet *p, const packet_frame *f)
+{
+    unsigned signs = 0;
+    for (int k = 0; k < 3; k++) {
+        bool down = v4l_mask((v4l)f->direction[k][0]) & 1;
+        v4d near[2], far[2], inverse[2];
+        for (int h = 0; h < 2; h++) {
+            v4d d = f->direction[k][h], origin = f->origin[k][h],
+                ahead = v4d_signed(v4d_abs(origin) * 0x1p-21 + f->error, d);
+            near[h] = origin + ahead;
+            far[h] = origin - ahead;
+            inverse[h] = 1 / v4d_signed(v4d_max(v4d_abs(d), v4d_all(0x1p-72)), d);
+        }
+        packet_set_axis(p, k, down, f8_from_doubles(near[0], near[1]),
+                        f8_from_doubles(far[0], far[1]), f8_from_doubles(inverse[0], inverse[1]));
+        signs |= (unsigned)down << k;
+    }
+    p->side_at = ray_side_at[signs];
     /* numbers that are read, but not used */
     p->near_from[3] = p->far_from[3] = p->near_inverse[3] = p->far_inverse[3] = 0;
     p->near_step[0] = p->far_step[0] = 0;
@@ -530,11 +547,21 @@ EBPO_EIGHT unsigned packet_rays(const ray_packet *p, const ebpo_bound *b, unsign
     return f8_bits(f8_at_most(from, to));
 }
 
+/* Returns the search of a ray of the packet; NULL if the ray misses all faces. (This is certain
+ * before the walk only for rays with moved origins, which packet_read refuses.) */
+static ebpo_ray_search *packet_search(ray_packet *p, unsigned i)
+{
+    if (!p->search[i])
+        p->search[i] = ray_begin(p->g, p->first + i);
+    return p->search[i];
+}
+
 /* Visits a block with the rays that may intersect its box. */
 EBPO_EIGHT void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block, unsigned rays,
                              bool wide)
 {
     ray_corners read, relative;
+    f8 bounds = f8_load(p->bounds);
     if (!wide) {
         ebpo_face_block faces = ebpo_face_block_open(s, block);
         for (int k = 0; k < 3; k++)
@@ -542,21 +569,22 @@ EBPO_EIGHT void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block,
     }
     for (; rays; rays &= rays - 1) {
         unsigned i = (unsigned)__builtin_ctz(rays);
+        ebpo_ray_search *r = packet_search(p, i);
         for (int k = 0; k < 3 && !wide; k++)
-            ray_relative(p->ray[i], k, read.axis[k], relative.axis[k]);
-        ray_block(p->ray[i], block, wide ? NULL : &relative, wide);
-        p->bounds[i] = p->ray[i]->bound;
+            ray_relative(r, k, read.axis[k], relative.axis[k]);
+        ray_block(r, block, wide ? NULL : &relative, wide);
+        bounds = packet_with_bound(bounds, i, r->bound);
     }
-    packet_set_bound(p);
+    packet_set_bounds(p, bounds);
 }
 
 /* Walks with one ray through a child that no other ray enters. `stack`: the free part of the
  * packet's stack, which has space for the levels below the child. */
 EBPO_EIGHT void packet_single(ray_packet *p, uint32_t child, ebpo_visit *stack, unsigned ray)
 {
-    ray_walk_from(p->ray[ray], child, stack);
-    p->bounds[ray] = p->ray[ray]->bound;
-    packet_set_bound(p);
+    ebpo_ray_search *r = packet_search(p, ray);
+    ray_walk_from(r, child, stack);
+    packet_set_bounds(p, packet_with_bound(f8_load(p->bounds), ray, r->bound));
 }
 
 /* Pushes the children `lanes` of a node, farthest first. In place of the child, a visit has the
@@ -606,28 +634,170 @@ EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stac
         }
     }
     for (unsigned i = 0; i < p->count; i++)
-        drop_beyond(p->ray[i]);
+        if (p->search[i])
+            drop_beyond(p->search[i]);
 }
 
-static void ray_walk_many(ebpo_ray_search *const *ray, unsigned count)
+/* --- turns: several rays walked in turns --- */
+
+/* The walk of a ray that takes turns with other rays. Between its turns, the memory that the ray
+ * needs next is fetched. */
+typedef struct ray_turn {
+    ebpo_ray_search *r;
+    ebpo_visit *stack; /* [EBPO_VISITS_MAX] */
+    uint32_t top;      /* number of visits on the stack */
+    uint32_t next;     /* the child to visit at the next turn */
+} ray_turn;
+
+/* Visits children until the ray needs a child that is not prefetched yet, and prefetches it.
+ * Returns false if the walk is complete. */
+EBPO_EIGHT bool ray_take_turn(ray_turn *w, bool wide, bool sorted)
 {
-    ray_packet p;
-    ebpo_visit stack[EBPO_VISITS_MAX];
-    for (unsigned i = 0; i < count; i++) {
-        ray_set_boxes(ray[i]);
-        ray_set_faces(ray[i]);
+    ebpo_ray_search *r = w->r;
+    const ebpo_accel *s = r->s;
+    uint32_t top = w->top, child = w->next;
+    for (;;) {
+        if (child & EBPO_IS_BLOCK) {
+            ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
+        } else {
+            f8 enter;
+            const ebpo_bound *b = &s->bound[child];
+            unsigned lanes = ray_children(r, b, &enter);
+            if (lanes) {
+                w->next = ray_enter(s, w->stack, &top, b, lanes, enter, wide, sorted);
+                w->top = top;
+                ray_fetch(s, w->next, wide);
+                return true;
+            }
+        }
+        do {
+            if (top == 0 || r->done)
+                return false;
+            child = (uint32_t)w->stack[--top];
+        } while (sorted && ebpo_visit_key(w->stack[top]) > r->bound);
     }
-    const ebpo_accel *s = ray[0]->s;
-    if (s->root_bound & EBPO_IS_BLOCK || !packet_is_coherent(ray, count)) {
-        for (unsigned i = 0; i < count; i++)
-            ray_walk_alone(ray[i], stack);
-        return;
+}
+
+/* Walks through the accel with rays of a group that take turns. */
+EBPO_EIGHT void ray_walk_in_turns(ebpo_ray_search *const *ray, unsigned count, ebpo_ray_group *g,
+                                  bool wide, bool sorted)
+{
+    ray_turn turn[EBPO_RAY_GROUP];
+    for (unsigned i = 0; i < count; i++)
+        turn[i] = (ray_turn){ ray[i], g->stack[i], 0, g->s->root_bound };
+    for (unsigned i = 0; count; i = i < count ? i : 0) {
+        if (ray_take_turn(&turn[i], wide, sorted)) {
+            i++;
+            continue;
+        }
+        drop_beyond(turn[i].r);
+        turn[i] = turn[--count];
     }
-    packet_set(&p, ray, count);
-    if (s->wide)
-        packet_walk(&p, s, stack, true);
+}
+
+/* --- a group of rays --- */
+
+/* Transforms rays to the frame as ray_search_begin (rays.c) does, and sets the bounds. No search is
+ * begun: many rays of a picture miss all blocks. Returns false if ray_search_begin would move an
+ * origin or scale a direction. */
+EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
+{
+    const ebpo_accel *s = p->g->s;
+    v4d far = v4d_all(0), beyond = v4d_all((double)EBPO_RAY_BEYOND), bound[2];
+    v4l plain = ~(v4l){ 0, 0, 0, 0 };
+    for (unsigned h = 0; h < 2; h++) {
+        const ebpo_ray *ray[4];
+        for (unsigned i = 0; i < 4; i++)
+            ray[i] = p->g->ray[p->first + (4 * h + i < p->count ? 4 * h + i : 0)];
+        v4d longest = v4d_all(0);
+        for (int k = 0; k < 3; k++) {
+            v4d origin = { ray[0]->origin[k], ray[1]->origin[k], ray[2]->origin[k],
+                           ray[3]->origin[k] },
+                d = { ray[0]->direction[k], ray[1]->direction[k], ray[2]->direction[k],
+                      ray[3]->direction[k] };
+            f->direction[k][h] = d;
+            f->origin[k][h] = (origin - s->centre[k]) * s->scale;
+            far = v4d_max(v4d_abs(f->origin[k][h]), far);
+            longest = v4d_max(v4d_abs(d), longest);
+        }
+        plain &= longest >= EBPO_RAY_SHORTEST;
+        plain &= longest <= EBPO_RAY_LONGEST;
+        v4d t = { ray[0]->t_max, ray[1]->t_max, ray[2]->t_max, ray[3]->t_max };
+        bound[h] = v4d_min(t * s->scale * (1 + 0x1p-20) + 0x1p-90, beyond);
+    }
+    f8 bounds = f8_from_doubles(bound[0], bound[1]);
+    packet_set_bounds(p, f8_pick(f8_mask((1u << p->count) - 1), bounds, f8_all(-1)));
+    double farthest = v4d_greatest(far);
+    f->error = ebpo_ray_error(s, farthest);
+    return v4l_mask(plain) == 15 && farthest <= EBPO_RAY_NEAR * s->largest_coordinate &&
+           s->scale > 0 && s->scale < INFINITY;
+}
+
+/* Does the same as packet_read with searches, which the function begins. */
+static void packet_read_begun(ray_packet *p, packet_frame *f)
+{
+    const ebpo_ray_search *any = NULL;
+    for (unsigned i = 0; i < p->count; i++)
+        any = packet_search(p, i) ? p->search[i] : any;
+    f8 bounds = f8_all(-1); /* misses all boxes */
+    memset(f, 0, sizeof *f);
+    for (unsigned i = 0; i < 8; i++) {
+        const ebpo_ray_search *r = i < p->count ? p->search[i] : NULL;
+        bounds = r ? packet_with_bound(bounds, i, r->bound) : bounds;
+        r = r ? r : any;
+        for (int k = 0; k < 3 && r; k++) {
+            f->origin[k][i / 4][i % 4] = r->origin[k];
+            f->direction[k][i / 4][i % 4] = r->direction[k];
+        }
+        f->error = r && r->error > f->error ? r->error : f->error;
+    }
+    packet_set_bounds(p, bounds);
+}
+
+/* Walks with the rays of a packet, if they are similar. Otherwise adds their searches to `other`.
+ */
+static void ray_walk_packet(ray_packet *p, ebpo_ray_search **other, unsigned *others)
+{
+    const ebpo_accel *s = p->g->s;
+    packet_frame f;
+    if (p->count > 1 && p->g->wants == EBPO_WANTS_FIRST && !(s->root_bound & EBPO_IS_BLOCK)) {
+        if (!packet_read(p, &f))
+            packet_read_begun(p, &f);
+        if (packet_is_coherent(&f, s)) {
+            packet_set(p, &f);
+            if (s->wide)
+                packet_walk(p, s, p->g->stack[0], true);
+            else
+                packet_walk(p, s, p->g->stack[0], false);
+            return;
+        }
+    }
+    for (unsigned i = 0; i < p->count; i++)
+        if (packet_search(p, i))
+            other[(*others)++] = p->search[i];
+}
+
+static void ray_walk_many(ebpo_ray_group *g)
+{
+    ebpo_ray_search *other[EBPO_RAY_GROUP];
+    unsigned others = 0;
+    bool wide = g->s->wide, sorted = g->wants == EBPO_WANTS_FIRST;
+    for (unsigned i = 0; i < g->count && g->s->bound_count; i += EBPO_RAY_PACKET) {
+        ray_packet p;
+        p.g = g;
+        p.first = i;
+        p.count = g->count - i < EBPO_RAY_PACKET ? g->count - i : EBPO_RAY_PACKET;
+        memset(p.search, 0, sizeof p.search);
+        ray_walk_packet(&p, other, &others);
+    }
+    if (wide && sorted)
+        ray_walk_in_turns(other, others, g, true, true);
+    else if (wide)
+        ray_walk_in_turns(other, others, g, true, false);
+    else if (sorted)
+        ray_walk_in_turns(other, others, g, false, true);
     else
-        packet_walk(&p, s, stack, false);
+        ray_walk_in_turns(other, others, g, false, false);
 }
 
 const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };

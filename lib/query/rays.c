@@ -55,7 +55,7 @@ typedef struct ray_rounds {
 
 /* A query with one ray. */
 typedef struct casting {
-    ebpo_context *context; /* EBPO_WANTS_ALL: the hits are in context->unsorted_hits */
+    ebpo_context *context;
     ebpo_segment ray;
     ebpo_ray_wants wants;
     ebpo_ray_sides sides; /* only hits of these sides of faces count */
@@ -66,6 +66,9 @@ typedef struct casting {
     bool no_memory;
     uint64_t count;       /* number of hits that are kept */
     ebpo_ray_found first; /* EBPO_WANTS_FIRST: the first hit so far, if count > 0 */
+    /* EBPO_WANTS_ALL: an array of the context or of a group of rays with the hits; its capacity */
+    ebpo_ray_found **found;
+    uint64_t *capacity;
 } casting;
 
 static inline void casting_begin(casting *c, ebpo_context *context, const double origin[3],
@@ -81,6 +84,8 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
     c->done = c->waits = c->no_memory = false;
     c->rounds = NULL;
     c->count = 0;
+    c->found = &context->unsorted_hits;
+    c->capacity = &context->found_capacity;
 }
 
 static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
@@ -90,13 +95,6 @@ static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
 
 /* --- one ray through one accel --- */
 
-/* The origin of a ray is moved along the ray towards the faces if the origin is far from the accel.
- * That is so if a coordinate of the origin, in the accel's frame, is greater than this multiple of
- * the accel's largest coordinate. */
-static const double near_enough = 4;
-/* This value is used in place of infinity, because infinity times 0 is NaN. */
-#define BEYOND 0x1p100f
-
 /* --- limits --- */
 
 /* Converts t to the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
@@ -105,8 +103,8 @@ static const double near_enough = 4;
 static float frame_t(const ebpo_ray_search *r, double t, int sign)
 {
     double scaled = t * r->limit_scale;
-    if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)BEYOND))
-        return sign > 0 || t == INFINITY ? BEYOND : -1;
+    if (!(r->limit_scale > 0 && r->limit_scale < INFINITY && scaled < (double)EBPO_RAY_BEYOND))
+        return sign > 0 || t == INFINITY ? EBPO_RAY_BEYOND : -1;
     double relative = scaled - r->moved + sign * (0x1p-50 * (scaled + r->moved) + 0x1p-90);
     return (float)(relative + sign * fabs(relative) * 0x1p-22);
 }
@@ -147,7 +145,7 @@ static double to_frame(ebpo_ray_search *r)
         greatest = greater_of(greatest, fabs(r->origin[k]));
     }
     r->limit_scale = s->scale;
-    if (!(longest >= 0x1p-12 && longest <= 0x1p12))
+    if (!(longest >= EBPO_RAY_SHORTEST && longest <= EBPO_RAY_LONGEST))
         scale_direction(r, longest);
     r->moved = 0;
     return greatest;
@@ -197,19 +195,14 @@ static bool move_origin(ebpo_ray_search *r, double *greatest)
     return true;
 }
 
-/* Sets a bound of the error of the origin in the frame. Several steps add an error. The origin is
- * moved, transformed to the frame and back to the model's unit, and split into floats. Small
- * coordinates of the direction are replaced (docs/develop/bounds.md, "A ray against boxes").
- * `greatest`: the largest absolute coordinate of the origin. */
+/* Sets the error of the origin. `greatest`: as in ebpo_ray_error. */
 static void set_error(ebpo_ray_search *r, double greatest)
 {
-    const double *c = r->s->centre;
-    double unit = (fabs(c[0]) + fabs(c[1]) + fabs(c[2])) * r->s->scale;
-    r->error = 0x1p-45 * (greatest + unit) + 0x1p-55 * r->s->largest_coordinate + 0x1p-53;
+    r->error = ebpo_ray_error(r->s, greatest);
     r->blur = greatest < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
     if (greatest < 0x1p80)
         return;
-    r->error = (double)BEYOND; /* the ray may intersect all boxes */
+    r->error = (double)EBPO_RAY_BEYOND; /* the ray may intersect all boxes */
     memset(r->origin, 0, sizeof r->origin);
 }
 
@@ -246,12 +239,12 @@ static bool ray_search_begin(ebpo_ray_search *r, const ebpo_accel *s)
     if (s->bound_count == 0)
         return false;
     double greatest = to_frame(r);
-    if (!(greatest <= near_enough * s->largest_coordinate) &&
+    if (!(greatest <= EBPO_RAY_NEAR * s->largest_coordinate) &&
         greatest < 0x1p46 * s->largest_coordinate && !move_origin(r, &greatest))
         return false;
     set_error(r, greatest);
     r->surely = frame_t(r, r->ray->t_max, -1);
-    r->bound = BEYOND;
+    r->bound = EBPO_RAY_BEYOND;
     lower_bound(r);
     return true;
 }
@@ -294,15 +287,13 @@ static void keep_first(casting *c, const ebpo_ray_found *m)
 /* Keeps a hit, if it is wanted. */
 static void casting_keep(casting *c, const ebpo_ray_found *m)
 {
-    ebpo_context *k = c->context;
     if (c->wants == EBPO_WANTS_FIRST) {
         keep_first(c, m);
     } else if (c->wants == EBPO_WANTS_ANY) {
         c->count = 1;
         c->done = true;
-    } else if (ebpo_grow(&k->unsorted_hits, &k->found_capacity, c->count + 1,
-                         sizeof *k->unsorted_hits)) {
-        k->unsorted_hits[c->count++] = *m;
+    } else if (ebpo_grow(c->found, c->capacity, c->count + 1, sizeof **c->found)) {
+        (*c->found)[c->count++] = *m;
     } else {
         c->done = c->no_memory = true;
     }
@@ -354,37 +345,37 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
     *end = begin;
     if (!ebpo_grow(&k->hits, &k->hit_capacity, begin + c->count, sizeof *k->hits))
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
-    sort_found(k->unsorted_hits, c->count, &c->ray);
+    const ebpo_ray_found *found = *c->found;
+    sort_found(*c->found, c->count, &c->ray);
     for (uint64_t i = 0; i < c->count; i++)
         /* A face that several subtrees list may be hit several times. */
-        if (i == 0 || k->unsorted_hits[i].file_face != k->unsorted_hits[i - 1].file_face)
-            k->hits[(*end)++] = hit_of(&k->unsorted_hits[i]);
+        if (i == 0 || found[i].file_face != found[i - 1].file_face)
+            k->hits[(*end)++] = hit_of(&found[i]);
     return EBPO_OK;
 }
 
 /* Returns the same as ray_fault, more slowly. */
-static const char *ray_fault_of(const ebpo_segment *ray)
+static const char *ray_fault_of(const double o[3], const double d[3], double t_max)
 {
     double not_finite = 0, longest = 0; /* not_finite: 0, or NaN if a coordinate is not finite */
     for (int k = 0; k < 3; k++) {
-        not_finite += ray->origin[k] * 0 + ray->direction[k] * 0;
-        longest = fabs(ray->direction[k]) > longest ? fabs(ray->direction[k]) : longest;
+        not_finite += o[k] * 0 + d[k] * 0;
+        longest = fabs(d[k]) > longest ? fabs(d[k]) : longest;
     }
     if (not_finite != 0)
         return "has a coordinate that is not a finite number";
     if (longest == 0)
         return "needs a direction other than (0, 0, 0)";
-    return ray->t_max >= 0 ? NULL : "needs a t_max of 0 or more";
+    return t_max >= 0 ? NULL : "needs a t_max of 0 or more";
 }
 
 /* Returns NULL for a valid ray, otherwise the end of an error message ("the ray ..."). */
-static inline const char *ray_fault(const ebpo_segment *ray)
+static inline const char *ray_fault(const double o[3], const double d[3], double t_max)
 {
-    const double *o = ray->origin, *d = ray->direction;
     double far = fabs(o[0]) + fabs(o[1]) + fabs(o[2]), size = fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
-    if (size > 0 && far + size < INFINITY && ray->t_max >= 0)
+    if (size > 0 && far + size < INFINITY && t_max >= 0)
         return NULL;
-    return ray_fault_of(ray);
+    return ray_fault_of(o, d, t_max);
 }
 
 /* Returns false if the ray misses the box [low, high], enlarged by `slack`, for all t in 0 ..
@@ -440,6 +431,17 @@ static bool begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
     return ray_search_begin(r, s);
 }
 
+/* Ends a search after the kernel's walk. */
+static void end_search(ebpo_ray_search *r)
+{
+    casting *c = r->user;
+    judge_waiting(r);
+    if (r->any_hit) {
+        c->count = 1;
+        c->done = true;
+    }
+}
+
 /* Searches the faces of a subtree or of the whole model. */
 static void cast_subtree(casting *c, const ebpo_accel *s)
 {
@@ -447,11 +449,7 @@ static void cast_subtree(casting *c, const ebpo_accel *s)
     if (!begin_search(c, &r, s))
         return;
     c->context->model->kernels.ray->walk(&r);
-    judge_waiting(&r);
-    if (r.any_hit) {
-        c->count = 1;
-        c->done = true;
-    }
+    end_search(&r);
 }
 
 /* Returns true if the ray may enter the node's cell before its limit (conservative). *enter,
@@ -564,7 +562,7 @@ static ebpo_status cast_ray(casting *c, ebpo_context *context, const double orig
 {
     casting_begin(c, context, origin, direction, t_max, wants, EBPO_RAY_BOTH);
     ebpo_status status = ebpo_check_mesh(context->model, error);
-    const char *fault = ray_fault(&c->ray);
+    const char *fault = ray_fault(origin, direction, t_max);
     if (fault)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray %s", fault);
     return status == EBPO_OK ? ray_walk(c, error) : status;
@@ -651,9 +649,24 @@ static void begin_ray(batch *b, uint64_t i, unsigned worker, casting *c)
                   b->options.sides);
 }
 
-static void store_first(batch *b, uint64_t i, const casting *c)
+/* Stores the result of ray i. */
+static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *c,
+                                ebpo_error *error)
 {
-    b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+    ebpo_status status = EBPO_OK;
+    if (b->wants == EBPO_WANTS_FIRST)
+        b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+    else if (b->wants == EBPO_WANTS_ANY)
+        b->any[i] = c->count;
+    else {
+        found f = { .worker = worker, .begin = b->hit_count[worker] };
+        status = casting_sort(c, f.begin, &f.end, error);
+        b->hit_count[worker] = f.end;
+        b->all[i] = f;
+    }
+    if (status == EBPO_OK && b->options.done)
+        b->options.done[i] = true;
+    return status;
 }
 
 /* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
@@ -666,73 +679,93 @@ static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *r
     c.rounds = rounds;
     ebpo_status status = ray_walk(&c, error);
     *waits = c.waits;
-    if (status != EBPO_OK || c.waits)
-        return status;
-    if (b->wants == EBPO_WANTS_FIRST)
-        store_first(b, i, &c);
-    else if (b->wants == EBPO_WANTS_ANY)
-        b->any[i] = c.count;
-    else {
-        found f = { .worker = worker, .begin = b->hit_count[worker] };
-        status = casting_sort(&c, f.begin, &f.end, error);
-        b->hit_count[worker] = f.end;
-        b->all[i] = f;
-    }
-    if (status == EBPO_OK && b->options.done)
-        b->options.done[i] = true;
-    return status;
+    return status == EBPO_OK && !c.waits ? store_result(b, i, worker, &c, error) : status;
 }
 
-/* Space for rays that are walked together. It is not on the stack, because a query needs less than
+/* Rays that are evaluated together. They are not on the stack, because a query needs less than
  * 64 KiB of it (ebpo/base.h). */
-typedef struct packet {
-    casting c[EBPO_RAY_PACKET];
-    ebpo_ray_search search[EBPO_RAY_PACKET];
-} packet;
+typedef struct group {
+    batch *b;
+    unsigned worker;
+    ebpo_ray_group rays;
+    uint64_t index[EBPO_RAY_GROUP]; /* indices in the batch */
+    casting c[EBPO_RAY_GROUP];
+    ebpo_ray_search search[EBPO_RAY_GROUP];
+    ebpo_ray_search *begun[EBPO_RAY_GROUP]; /* NULL: the ray misses all faces */
+    ebpo_ray_found *found[EBPO_RAY_GROUP];  /* casting.found */
+    uint64_t capacity[EBPO_RAY_GROUP];
+} group;
 
-/* Finds the first hits of these rays, at most EBPO_RAY_PACKET, in a model that is completely in
- * memory. Results are those of cast_one. */
-static ebpo_status cast_packet(batch *b, packet *p, const uint64_t *ray, unsigned count,
-                               unsigned worker, ebpo_error *error)
+/* Begins the search of ray i of a group (ebpo_ray_group.begin). */
+static ebpo_ray_search *begin_of_group(void *user, unsigned i)
 {
-    ebpo_ray_search *active[EBPO_RAY_PACKET];
-    const ebpo_model *m = b->context[worker]->model;
-    unsigned walking = 0;
+    group *g = user;
+    begin_ray(g->b, g->index[i], g->worker, &g->c[i]);
+    g->c[i].found = &g->found[i];
+    g->c[i].capacity = &g->capacity[i];
+    if (begin_search(&g->c[i], &g->search[i], g->rays.s))
+        g->begun[i] = &g->search[i];
+    return g->begun[i];
+}
+
+static void add_to_group(group *g, uint64_t ray)
+{
+    unsigned i = g->rays.count++;
+    g->rays.ray[i] = &g->b->rays[ray];
+    g->index[i] = ray;
+    g->begun[i] = NULL;
+}
+
+/* Finds the hits of a group of one or more rays. Results are those of cast_one. */
+static ebpo_status cast_group(group *g, ebpo_error *error)
+{
+    const ebpo_accel *s = g->rays.s;
     ebpo_status status = EBPO_OK;
-    for (unsigned i = 0; i < count; i++) {
-        begin_ray(b, ray[i], worker, &p->c[i]);
-        if (begin_search(&p->c[i], &p->search[i], m->whole))
-            active[walking++] = &p->search[i];
-    }
-    if (walking)
-        m->kernels.ray->walk_many(active, walking);
-    for (unsigned i = 0; i < walking; i++)
-        judge_waiting(active[i]);
-    for (unsigned i = 0; i < count && status == EBPO_OK; i++) {
-        status = ray_end(&p->c[i], EBPO_OK, error);
+    g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
+    /* Prefetches what the exact tests of candidates will read. (gcc omits calls of a separate
+     * function, as it has no result.) */
+    for (unsigned i = 0; i < g->rays.count; i++)
+        for (int k = 0; g->begun[i] && k < g->begun[i]->count; k++)
+            ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, g->begun[i]->waiting[k].slot));
+    for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
+        casting *c = &g->c[i];
+        if (g->begun[i])
+            end_search(g->begun[i]);
+        else
+            begin_ray(g->b, g->index[i], g->worker, c);
+        status = ray_end(c, EBPO_OK, error);
         if (status == EBPO_OK)
-            store_first(b, ray[i], &p->c[i]);
-        if (status == EBPO_OK && b->options.done)
-            b->options.done[ray[i]] = true;
+            status = store_result(g->b, g->index[i], g->worker, c, error);
     }
     return status;
 }
 
-/* Finds the first hits of the rays begin .. end - 1 in a model that is completely in memory. */
-static ebpo_status cast_packets(batch *b, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+/* Finds the hits of the rays begin .. end - 1 in a model that is completely in memory. */
+static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned worker,
+                               ebpo_error *error)
 {
-    packet *p = ebpo_alloc(1, sizeof *p);
-    ebpo_status status = p ? EBPO_OK : ebpo_fail_memory(error, sizeof *p);
+    group *g = ebpo_alloc(1, sizeof *g);
+    if (!g)
+        return ebpo_fail_memory(error, sizeof *g);
+    g->b = b;
+    g->worker = worker;
+    g->rays.s = b->context[worker]->model->whole;
+    g->rays.wants = b->wants;
+    g->rays.begin = begin_of_group;
+    g->rays.user = g;
+    memset(g->found, 0, sizeof g->found);
+    memset(g->capacity, 0, sizeof g->capacity);
+    ebpo_status status = EBPO_OK;
     for (uint64_t i = begin; i < end && status == EBPO_OK;) {
-        uint64_t ray[EBPO_RAY_PACKET];
-        unsigned count = 0;
-        for (; i < end && count < EBPO_RAY_PACKET; i++)
+        g->rays.count = 0;
+        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
             if (!b->options.done || !b->options.done[i])
-                ray[count++] = i;
-        status = cast_packet(b, p, ray, count, worker, error);
+                add_to_group(g, i);
+        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
     }
-    free(p);
+    for (unsigned i = 0; i < EBPO_RAY_GROUP; i++)
+        free(g->found[i]);
+    free(g);
     return status;
 }
 
@@ -834,9 +867,9 @@ static ebpo_status cast_range(void *user, uint64_t begin, uint64_t end, unsigned
 {
     batch *b = user;
     const ebpo_model *m = b->context[worker]->model;
-    if (m->whole && b->wants == EBPO_WANTS_FIRST)
-        return cast_packets(b, begin, end, worker, error);
-    return m->whole || m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
+    if (m->whole)
+        return cast_groups(b, begin, end, worker, error);
+    return m->options.loading != EBPO_LOAD_CACHE || !ebpo_input_prefetches(&m->file->in)
                ? cast_in_order(b, begin, end, worker, error)
                : cast_in_rounds(b, begin, end, worker, error);
 }
@@ -879,19 +912,10 @@ static void put_in_order(batch *b, const ebpo_model *m)
 
 /* --- on all cores --- */
 
-static ebpo_segment segment_of(const ebpo_ray *r)
-{
-    ebpo_segment s = { .t_max = r->t_max };
-    memcpy(s.origin, r->origin, sizeof s.origin);
-    memcpy(s.direction, r->direction, sizeof s.direction);
-    return s;
-}
-
 ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error *error)
 {
     for (uint64_t i = 0; i < count; i++) {
-        ebpo_segment ray = segment_of(&rays[i]);
-        const char *fault = ray_fault(&ray);
+        const char *fault = ray_fault(rays[i].origin, rays[i].direction, rays[i].t_max);
         if (fault)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "ray %" PRIu64 " %s", i, fault);
     }

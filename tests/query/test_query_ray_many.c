@@ -11,11 +11,23 @@
 #include "query/query_model.h"
 #include "query_support.h"
 
-/* Kernels that count how many sides of boxes they decode for eight children at a time. */
-static uint64_t decoded_sides;
+/* Kernels that count how many sides of boxes they decode for eight children at a time. They also
+ * count descents: visits of nodes of `counted_accel` at once after the visit of the parent. */
+static uint64_t decoded_sides, descents;
+static const ebpo_accel *counted_accel;
+static void count_descent(const uint8_t *x)
+{
+    static const ebpo_bound *last;
+    const ebpo_bound *first = counted_accel->bound;
+    const ebpo_bound *node = first + (size_t)(x - (const uint8_t *)first) / sizeof *first;
+    descents += node != last && first + node->parent == last;
+    last = node;
+}
 EBPO_EIGHT f8 decode_sides(const uint8_t *x)
 {
     decoded_sides++;
+    if (counted_accel)
+        count_descent(x);
     return f8_from_bytes(x);
 }
 #define f8_from_bytes      decode_sides
@@ -164,7 +176,8 @@ END_TEST
 /* --- coherent rays, which a batch walks through the model together --- */
 
 /* Makes rays that differ from the first one by about `share` of its origin and direction, or of one
- * of these, or of nothing. Some rays end near the hit of the first ray. */
+ * of these, or of nothing. Some origins are far away. Some rays end near the hit of the first ray.
+ */
 static void make_coherent(query_model *m, uint64_t *state, double share, ebpo_ray *rays,
                           unsigned count)
 {
@@ -175,12 +188,15 @@ static void make_coherent(query_model *m, uint64_t *state, double share, ebpo_ra
     for (int k = 0; k < 3; k++)
         if (!isfinite(first->direction[k]))
             first->direction[k] = copysign(1e300, first->direction[k]);
-    ASSERT_OK(ebpo_ray_first(m->context, first->origin, first->direction, first->t_max, &hit,
-                             &found, error));
-    unsigned how = (unsigned)(ebpo_test_random(state) % 4);
     double size = 0;
     for (int k = 0; k < 3; k++)
         size = fmax(size, fabs(first->direction[k]));
+    bool far = ebpo_test_random(state) % 4 == 0;
+    for (int k = 0; k < 3 && far; k++)
+        first->origin[k] -= 8 * m->info.box_size[k] * (first->direction[k] / size);
+    ASSERT_OK(ebpo_ray_first(m->context, first->origin, first->direction, first->t_max, &hit,
+                             &found, error));
+    unsigned how = (unsigned)(ebpo_test_random(state) % 4);
     for (unsigned i = 1; i < count; i++) {
         rays[i] = *first;
         for (int k = 0; k < 3; k++) {
@@ -222,11 +238,28 @@ START_TEST(test_coherent_rays_match_single_rays)
 }
 END_TEST
 
-/* Returns the number of sides that are decoded for rays from one eye through a square of pixels, in
- * calls of `part` rays. */
-static uint64_t count_sides(query_model *m, uint64_t part)
+/* Counts the searches that a group of rays begins. */
+static uint64_t begun;
+static ebpo_ray_search *(*uncounted_begin)(void *user, unsigned i);
+static ebpo_ray_search *counted_begin(void *user, unsigned i)
 {
-    enum { SIDE = 64 };
+    begun++;
+    return uncounted_begin(user, i);
+}
+static void counted_walk_many(ebpo_ray_group *g)
+{
+    uncounted_begin = g->begin;
+    g->begin = counted_begin;
+    ebpo_ray_kernels_counted.walk_many(g);
+    g->begin = uncounted_begin;
+}
+
+enum { SIDE = 64 };
+
+/* Returns the number of sides that are decoded for rays from one eye through SIDE * SIDE pixels, in
+ * calls of `part` rays. *hit: the number of rays with a hit. */
+static uint64_t count_sides(query_model *m, uint64_t part, uint64_t *hit)
+{
     static ebpo_ray rays[SIDE * SIDE];
     static ebpo_ray_hit hits[SIDE * SIDE];
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
@@ -239,6 +272,9 @@ static uint64_t count_sides(query_model *m, uint64_t part)
     decoded_sides = 0;
     for (uint64_t i = 0; i < SIDE * SIDE; i += part)
         ASSERT_OK(ebpo_ray_first_many(m->context, rays + i, part, &options, hits + i, error));
+    *hit = 0;
+    for (int i = 0; i < SIDE * SIDE; i++)
+        *hit += hits[i].face != EBPO_NO_FACE;
     return decoded_sides;
 }
 
@@ -247,10 +283,98 @@ START_TEST(test_coherent_rays_share_nodes)
     query_model m;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
     m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
-    uint64_t single = count_sides(&m, 1), together = count_sides(&m, EBPO_RAY_PACKET);
+    uint64_t hits, single = count_sides(&m, 1, &hits),
+                   together = count_sides(&m, EBPO_RAY_PACKET, &hits);
     ck_assert_msg(together > 0 && 3 * together < single, "%llu sides, single rays %llu",
                   (unsigned long long)together, (unsigned long long)single);
     query_model_free(&m);
+}
+END_TEST
+
+/* A search is begun only for a ray of a packet that reaches a block. */
+START_TEST(test_coherent_rays_begin_few_searches)
+{
+    const ebpo_ray_kernels kernels = { ebpo_ray_kernels_counted.walk, counted_walk_many };
+    query_model m;
+    uint64_t hits;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &kernels;
+    begun = 0;
+    count_sides(&m, EBPO_RAY_PACKET, &hits);
+    ck_assert_msg(hits <= begun && 4 * begun < 3 * SIDE * SIDE, "%llu searches, %llu hits",
+                  (unsigned long long)begun, (unsigned long long)hits);
+    query_model_free(&m);
+}
+END_TEST
+
+/* Returns the number of descents of a call for rays. */
+static uint64_t count_descents(query_model *m, ebpo_ray_wants wants, const ebpo_ray *rays,
+                               uint64_t count)
+{
+    static ebpo_ray_hit first[640];
+    static bool any[640];
+    const ebpo_ray_hit *hits;
+    const uint64_t *begin;
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    options.threads = 1;
+    descents = 0;
+    if (wants == EBPO_WANTS_FIRST)
+        ASSERT_OK(ebpo_ray_first_many(m->context, rays, count, &options, first, error));
+    else if (wants == EBPO_WANTS_ANY)
+        ASSERT_OK(ebpo_ray_any_many(m->context, rays, count, &options, any, error));
+    else
+        ASSERT_OK(ebpo_ray_all_many(m->context, rays, count, &options, &hits, &begin, error));
+    return descents;
+}
+
+/* Rays that are not similar take turns, so that memory is fetched for one ray while others are
+ * evaluated: a ray rarely visits a node at once after its parent. */
+START_TEST(test_other_rays_take_turns)
+{
+    enum { RAYS = 640 };
+    query_model m;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    ebpo_ray *rays = make_rays(&m, RAYS, 5);
+    uint64_t single = 0, together;
+    counted_accel = m.context->model->whole;
+    for (int i = 0; i < RAYS; i++)
+        single += count_descents(&m, (ebpo_ray_wants)_i, rays + i, 1);
+    together = count_descents(&m, (ebpo_ray_wants)_i, rays, RAYS);
+    counted_accel = NULL;
+    ck_assert_msg(single > 100 && 5 * together < single, "%llu descents, single rays %llu",
+                  (unsigned long long)together, (unsigned long long)single);
+    free(rays);
+    query_model_free(&m);
+}
+END_TEST
+
+/* Rays in the plane of many faces have so many candidates that some are tested during the walk,
+ * between the turns of other rays. */
+START_TEST(test_many_hits_during_turns)
+{
+    enum { RAYS = 16 };
+    const double low[3] = { 0, 0, 0 }, high[3] = { 1, 1, 1 };
+    const ebpo_ray_hit *hits, *single;
+    const uint64_t *begin;
+    uint64_t count;
+    ebpo_ray rays[RAYS];
+    query_model m, other;
+    query_model_make(&m, "box", ebpo_test_box(low, high, 30), &query_variants[0]);
+    query_model_make(&other, "box", ebpo_test_box(low, high, 30), &query_variants[0]);
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (ebpo_ray){ { -0.3, 0.05 * i, 1 }, { 1, 0.7 - 0.08 * i, 0 }, INFINITY };
+    ASSERT_OK(ebpo_ray_all_many(m.context, rays, RAYS, NULL, &hits, &begin, error));
+    ck_assert_uint_gt(begin[RAYS], EBPO_RAY_CANDIDATES * RAYS / 2);
+    for (int i = 0; i < RAYS; i++) {
+        ASSERT_OK(ebpo_ray_all(other.context, rays[i].origin, rays[i].direction, INFINITY, &single,
+                               &count, error));
+        ck_assert_uint_eq(begin[i + 1] - begin[i], count);
+        for (uint64_t k = 0; k < count; k++)
+            ck_assert(same_hit(&hits[begin[i] + k], &single[k]));
+    }
+    query_model_free(&m);
+    query_model_free(&other);
 }
 END_TEST
 
@@ -385,6 +509,9 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
     tcase_add_test(many, test_coherent_rays_share_nodes);
+    tcase_add_test(many, test_coherent_rays_begin_few_searches);
+    tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
+    tcase_add_test(many, test_many_hits_during_turns);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
