@@ -334,6 +334,59 @@ START_TEST(test_tiny_surface_matches_sums_over_faces)
 }
 END_TEST
 
+/* Makes narrow rings with random axes around the origin. The caps of all rings are near the origin.
+ */
+static ebpo_mesh crossing_rings(uint64_t *state, unsigned rings)
+{
+    enum { SIDES = 6 };
+    ebpo_mesh m = ebpo_test_tetrahedron(0x1p-10);
+    for (unsigned r = 0; r < rings; r++) {
+        double along[3], beside[3], axis[3];
+        uint32_t corner[SIDES][2];
+        for (int k = 0; k < 3; k++) {
+            along[k] = ebpo_test_random_unit(state) - 0.5;
+            beside[k] = ebpo_test_random_unit(state) - 0.5;
+        }
+        for (int k = 0; k < 3; k++)
+            axis[k] = 0x1p-6 * (along[(k + 1) % 3] * beside[(k + 2) % 3] -
+                                along[(k + 2) % 3] * beside[(k + 1) % 3]);
+        for (uint32_t i = 0; i < SIDES; i++)
+            for (int side = 0; side < 2; side++) {
+                double p[3], x, y;
+                ebpo_test_circle(i, SIDES, &x, &y);
+                for (int k = 0; k < 3; k++)
+                    p[k] = x * along[k] + y * beside[k] + side * axis[k];
+                corner[i][side] = ebpo_test_append_vertex(&m, p[0], p[1], p[2]);
+            }
+        for (uint32_t i = 0; i < SIDES; i++) {
+            const uint32_t *a = corner[i], *b = corner[(i + 1) % SIDES];
+            ebpo_test_append_face(&m, a[0], b[0], b[1]);
+            ebpo_test_append_face(&m, a[0], b[1], a[1]);
+        }
+    }
+    return m;
+}
+
+/* So many caps touch some cells that ebpo_near_cell.touching is EBPO_TOUCHING_ALL. */
+START_TEST(test_many_caps_in_one_cell_match_sums_over_faces)
+{
+    uint64_t state = 27, all = 0;
+    holed h;
+    holed_make(&h, crossing_rings(&state, 150), EBPO_RULE_NONZERO, 0.25);
+    const ebpo_node_table *t = &h.model->whole->nodes;
+    for (uint32_t i = 0; i < t->near_count; i++)
+        all += t->near[i].touching == EBPO_TOUCHING_ALL && t->near[i].count > EBPO_TOUCHING_ALL + 1;
+    ck_assert_uint_gt(all, 0);
+    for (int i = 0; i < 100; i++) {
+        double p[3] = { 0.15, 0, 0 }; /* beyond 0.1, so check_point does not read nodes */
+        for (int k = 0; k < 3; k++)
+            p[k] += 0.04 * ebpo_test_random_unit(&state);
+        check_point(&h, p, EBPO_RULE_NONZERO, 0.25);
+    }
+    holed_free(&h);
+}
+END_TEST
+
 /* Makes the three faces of a cube of size 2 that touch the origin. */
 static ebpo_mesh three_cube_faces(void)
 {
@@ -954,6 +1007,7 @@ TEST_SUITE(holes)
     tcase_add_loop_test(shapes, test_envelopes_contain_inside, 0, 3);
     tcase_add_test(shapes, test_winding_numbers_on_both_sides_of_cap);
     tcase_add_test(shapes, test_tiny_surface_matches_sums_over_faces);
+    tcase_add_test(shapes, test_many_caps_in_one_cell_match_sums_over_faces);
     tcase_add_test(shapes, test_ties_are_counted);
     tcase_add_test(shapes, test_invalid_queries_are_refused);
     tcase_add_test(shapes, test_border_is_added_to_file);
