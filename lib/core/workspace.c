@@ -537,8 +537,8 @@ static bool should_release(const ebpo_workspace *w)
 }
 
 /* Returns false if this thread has had fewer than FAULTS_MIN page faults since the function last
- * returned true to it for this workspace. A fault brings at most 64 KiB of a file into memory. The
- * system counts faults in a third of the time that statm takes. */
+ * returned true to it for this workspace. In most file systems, a fault maps at most 64 KiB of a
+ * file. Reading the number of faults takes a third of the time of reading statm. */
 static bool has_faulted(const ebpo_workspace *w)
 {
 #ifdef EBPO_HAVE_RUSAGE_THREAD

@@ -10,6 +10,7 @@
 
 #include "check_main.h"
 #include "models_reference.h"
+#include "extras/collide/posed_subtrees.h"
 #include "geometry/triangle_pair.h"
 #include "query_support.h"
 #include "solids.h"
@@ -589,6 +590,59 @@ START_TEST(test_collision_visits_few_subtrees)
 }
 END_TEST
 
+/* Deep bounds exclude pairs of subtrees of partly loaded models. They are not read for a collision
+ * with a whole model. */
+START_TEST(test_deep_bounds_are_read_for_two_parts)
+{
+    enum { CUT = 3 };
+    query_model m;
+    ebpo_pose pose = EBPO_POSE_INIT;
+    pose.translation[0] = 0.31;
+    query_model_make(&m, "fine torus", ebpo_test_torus(2, 0.7, 128, 64), &query_variants[0]);
+    ebpo_model *part[2] = { open_part(&m, CUT, NULL), open_part(&m, CUT, NULL) };
+    for (int i = 0; i < 2; i++) {
+        ebpo_collider *collider = meet(part[i], i ? part[0] : m.model);
+        reported pairs = query_pairs(collider, &pose);
+        ck_assert_uint_gt(pairs.count, 0);
+        ck_assert_int_eq(part[i]->deep != NULL, i);
+        free(pairs.bytes);
+        ebpo_collider_free(collider);
+    }
+    for (int i = 0; i < 2; i++)
+        ebpo_model_free(part[i]);
+    query_model_free(&m);
+}
+END_TEST
+
+/* A collision of a model with itself uses the envelopes of two nodes of the same model. The second
+ * envelope leaves the first one as it is, also if it takes the place of the first one. */
+START_TEST(test_two_deep_envelopes_at_once)
+{
+    query_model m;
+    ebpo_posed_subtrees s;
+    ebpo_posing posing;
+    ebpo_convex first, second;
+    const ebpo_pose pose = EBPO_POSE_INIT;
+    query_model_make(&m, "torus", query_solid_by_name("torus"), &query_variants[0]);
+    ebpo_model *part = open_part(&m, 1, NULL);
+    ASSERT_OK(ebpo_posing_make(&posing, &pose, (double[]){ 10, 10, 10 }, error));
+    ASSERT_OK(ebpo_posed_subtrees_make(&s, part, &posing, error));
+    const ebpo_cell at = { 5, { 0, 0, 0 } };
+    for (uint32_t i = 1; i < 1 << 12; i++) {
+        const ebpo_cell other = { 5, { i & 15, i >> 4 & 15, i >> 8 } };
+        double corner[8][3];
+        ASSERT_OK(ebpo_posed_deep_envelope(&s, at, &first, error));
+        ck_assert_int_eq(first.count, 8);
+        memcpy(corner, first.point, sizeof corner);
+        ASSERT_OK(ebpo_posed_deep_envelope(&s, other, &second, error));
+        ck_assert(memcmp(corner, first.point, sizeof corner) == 0);
+    }
+    ebpo_posed_subtrees_free(&s);
+    ebpo_model_free(part);
+    query_model_free(&m);
+}
+END_TEST
+
 /* Counts the calls of a progress function. */
 static bool count_call(void *user, const char *stage, uint64_t done, uint64_t total)
 {
@@ -656,6 +710,8 @@ TEST_SUITE(collide_parts)
     tcase_add_loop_test(tests, test_partly_loaded_collision_matches_whole, 0, NAMES * NAMES);
     tcase_add_test(tests, test_collision_shares_one_budget);
     tcase_add_test(tests, test_collision_visits_few_subtrees);
+    tcase_add_test(tests, test_deep_bounds_are_read_for_two_parts);
+    tcase_add_test(tests, test_two_deep_envelopes_at_once);
     tcase_add_test(tests, test_flat_models_are_apart_at_once);
     tcase_add_test(tests, test_small_models_load_whole);
     Suite *suite = suite_create("collide_parts");

@@ -169,7 +169,9 @@ void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
         free(s->deep_hull[i]);
     free(s->hull);
     free(s->deep_hull);
+    free(s->replaced);
     s->deep_hull = NULL;
+    s->replaced = NULL;
     free(s->rank);
     free(s->chain);
     s->hull = NULL;
@@ -424,7 +426,8 @@ ebpo_status ebpo_posed_deep_envelope(ebpo_posed_subtrees *s, ebpo_cell cell, ebp
         return ebpo_fail_memory(error, DEEP_HULLS * sizeof(posed_hull *));
     posed_hull **hull = &s->deep_hull[ebpo_hash_number(code) % DEEP_HULLS];
     if (!*hull || (*hull)->code != code) {
-        free(*hull);
+        free(s->replaced); /* not *hull, which the last call may have returned */
+        s->replaced = *hull;
         *hull = make_hull(s, cell);
     }
     if (!*hull)

@@ -34,6 +34,7 @@ typedef struct ebpo_posed_subtrees {
     uint64_t bytes;           /* memory of the envelopes and of the table */
     struct posed_hull **deep_hull; /* some envelopes of nodes below the roots of subtrees; NULL:
                                     * none was requested yet */
+    struct posed_hull *replaced;   /* the last envelope that left `deep_hull`, or NULL */
     struct envelope_chain *chain;  /* for the next envelope; NULL: none was requested yet */
 } ebpo_posed_subtrees;
 
@@ -70,7 +71,7 @@ ebpo_posed_node ebpo_posed_child(const ebpo_posed_subtrees *s, const ebpo_posed_
  * in memory. ebpo_posed_deep_node returns the root of a subtree with this cell as a node of the
  * deep bounds; it is gray if it has children. ebpo_posed_deep_child returns a child of a gray node.
  * ebpo_posed_deep_envelope does the same as ebpo_posed_envelope for such nodes, but *out is valid
- * only until the next call. */
+ * only until the second next call, so that two nodes of the same model can be compared. */
 ebpo_posed_node ebpo_posed_deep_node(const ebpo_posed_subtrees *s, ebpo_cell cell);
 ebpo_posed_node ebpo_posed_deep_child(const ebpo_posed_subtrees *s, const ebpo_posed_node *gray,
                                       unsigned octant);

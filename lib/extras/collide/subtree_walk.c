@@ -389,18 +389,20 @@ static ebpo_status count_subtrees(subtree_pairs *p, int side, const ebpo_posed_s
     return EBPO_OK;
 }
 
-/* Counts the subtrees of both models. Reads the deep bounds of a model that has many subtrees in
- * the pairs that were never loaded. Sets *more to true if deep bounds were read. */
+/* Counts the subtrees of both models. If both models are partly loaded, reads the deep bounds of a
+ * model that has many subtrees in the pairs that were never loaded. Sets *more to true if deep
+ * bounds were read. */
 static ebpo_status count_both(const subtree_pair_search *f, bool *more)
 {
     *more = false;
     for (int i = 0; i < 2; i++) {
         ebpo_model *m = f->collision->model[i];
+        const ebpo_model *other = f->collision->model[1 - i];
         uint64_t added;
         ebpo_status status = count_subtrees(f->out, i, f->side[i], &added, f->error);
         if (status != EBPO_OK)
             return status;
-        if (m->whole || m->deep)
+        if (m->whole || m->deep || other->whole)
             continue;
         ebpo_deep_bounds_report(m, added < UINT_MAX ? (unsigned)added : UINT_MAX);
         *more = *more || m->deep;

@@ -18,10 +18,10 @@ extern "C" {
 #endif
 
 /*
- * Allocates the arrays of models that are read, built or verified. A new array is in memory if it
- * and the other arrays in memory fit into half of the budget. All other arrays are in unnamed
- * temporary files, which disappear with the process. These files are mapped into memory, and their
- * resident part stays within the budget. Results do not depend on the workspace.
+ * Allocates the arrays of models that are read, built or verified. Arrays are in memory up to a
+ * quarter of the budget, or up to half of it if the process needs little other memory. All other
+ * arrays are in unnamed temporary files, which disappear with the process and are mapped into
+ * memory. Their resident part stays within the budget. Results do not depend on the workspace.
  */
 typedef struct ebpo_workspace ebpo_workspace;
 
