@@ -38,7 +38,7 @@ export class Scene {
     this.look = makeLook();
     this.uniforms = this.look.uniforms;
     this.tiles = new Tiles(this.scene, this.look);
-    this.isClosed = false; // true when the tiles are one closed surface, of which no back is visible from outside
+    this.isClosed = false; // true when the tiles are one closed surface; unless it intersects itself, no back is visible from outside
     this.pipeline = undefined; // { render(scene), resize(scene) } draws instead of the renderer, if present
     this.#warmUp();
     this.#makeProbe();
