@@ -459,6 +459,7 @@ async function dies(browser, { address, line }) {
   Object.assign(line, { mode: 'good', sent: [] });
   const page = await show(browser, `${address}?file=models/ring.ebpo.h5&level=4&detail=0`);
   await settled(page);
+  assert.match(await page.textContent('#sExcess'), /^\+[\d.]+ %$/);
   line.mode = 'dead';
   for (let i = 0; i < 6; i++)
     await page.keyboard.press('ArrowRight');

@@ -14,7 +14,7 @@ function infoOf(info) {
   if (info.pruned)
     parts.add('pruned');
   return { kind: info.solid ? 'solid' : 'surface', solid: info.solid, closed: info.outward && !info.pruned, parts,
-    box_origin: info.origin, box_size: info.size, vertex_count: info.vertices, face_count: info.faces,
+    mesh_volume: info.volume, box_origin: info.origin, box_size: info.size, vertex_count: info.vertices, face_count: info.faces,
     source_face_count: info.sourceFaces, mend_added_faces: info.addedFaces, winding_rule: info.rule, unit: info.unit || undefined, crs: info.crs || undefined, date: info.date || undefined,
     generator: info.generator, source_name: info.sourceName, source_format: info.sourceFormat, content_sha256: info.contentSha256, subset_of: info.subsetOf,
     subtree_level: info.subtreeLevel || undefined, level_count: info.levels.length,

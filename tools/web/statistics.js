@@ -51,7 +51,7 @@ export function showLevel() {
 // the leaves and black cells down to this level. The file stores the integral of the winding number, which is the model's volume only for a single shell.
 function volumeExcess(level) {
   const i = state.info;
-  if (!i.solid || !(i.mesh_volume > 0) || !i.mesh_manifold || i.mesh_components !== 1)
+  if (!i.solid || !i.closed)
     return undefined;
   let sum = i.levels[level].gray_volume;
   for (let l = 0; l <= level; l++)

@@ -50,6 +50,8 @@ export interface Info {
   solid: boolean; pruned: boolean; hasMesh: boolean;
   /** True for a closed 2-manifold of one component and positive volume: unless faces intersect, the outside is in front of all faces. */
   outward: boolean;
+  /** Volume of the mesh: the integral of the winding number. */
+  volume: number;
   /** True if coordinates are doubles. */
   doubles: boolean;
   /** contentSha256 of the original of a subset. */

@@ -300,6 +300,7 @@ int EBPO_JS(ebpo_js_info)(ebpo_js_object *object)
                  info->double_coordinates ? "true" : "false") == EBPO_OK &&
         put_vector(object, "origin", info->box_origin) == EBPO_OK &&
         put_vector(object, "size", info->box_size) == EBPO_OK &&
+        put_number(object, "volume", info->report.volume) == EBPO_OK &&
         put_number(object, "vertices", (double)info->vertex_count) == EBPO_OK &&
         put_number(object, "faces", (double)info->face_count) == EBPO_OK &&
         put_number(object, "sourceFaces", (double)info->source_face_count) == EBPO_OK &&
