@@ -32,10 +32,11 @@
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V; `slack` bounds
  * the error of V, so it changes I by at most 5 `slack` / d^2, and (f' V) . (p - q) by at most 2 s
- * `slack` / d^3. Rounding to float changes I by at
- * most 2^-20 a R / d^3. Radii, areas and errors are enlarged by a factor of 1 + 2^-40. Distances
- * are used only between 2^-300 and 2^300. Lengths below 2^-500 and areas below 2^-900 may
- * underflow. They change the results by less than the constants TINY and 2^-500, which are added.
+ * `slack` / d^3. Each slope adds 2^-40 a s / d^3, which covers the rounding of sums of up to 2^11
+ * slopes. Rounding to float changes I by at most 2^-20 a R / d^3. Radii, areas and errors are
+ * enlarged by a factor of 1 + 2^-40. Distances are used only between 2^-300 and 2^300. Lengths
+ * below 2^-500 and areas below 2^-900 may underflow. They change the results by less than the
+ * constants TINY and 2^-500, which are added.
  */
 #include "core/strict_fp.h"
 

@@ -558,11 +558,11 @@ static void limit_by_cells(searching *g)
 }
 
 /* For a remote file, reads deep bounds as soon as they pay: after a face is found, or before it if
- * the point is so far from all faces that the first face will exclude few subtrees. `lower`: bound
- * of all faces that were not searched. If the source of bytes returns EBPO_E_PENDING, this point
- * and all later points of the batch that need deep bounds wait for the next call; only the first of
- * them requests the bytes. A query with a deadline does not read them, because the read could take
- * longer. */
+ * the point is so far from all faces that the first face will exclude few subtrees (it lowers the
+ * limit by at most 40 %). `lower`: bound of all faces that were not searched. If the source of
+ * bytes returns EBPO_E_PENDING, this point and all later points of the batch that need deep bounds
+ * wait for the next call; only the first of them requests the bytes. A query with a deadline does
+ * not read them, because the read could take longer. */
 static ebpo_status improve_bounds(searching *g, double lower, ebpo_error *error)
 {
     ebpo_model *m = g->c->model;

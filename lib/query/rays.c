@@ -93,9 +93,7 @@ static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
     return (ebpo_ray_hit){ m->intersection.t, m->source_face, m->intersection.side };
 }
 
-/* --- one ray through one accel --- */
-
-/* --- limits --- */
+/* --- one ray through one accel: limits --- */
 
 /* Converts t to the frame (coordinates in which the subtree's cell has a size of 1 to 2), relative
  * to the moved origin. With `sign` 1, the result is at least the exact value; with -1, it is at
