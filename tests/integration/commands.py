@@ -140,9 +140,9 @@ COMMANDS = {
                              "-o OUT.ebpo.h5", ("OUT.ebpo.h5",)),
     "boolean ply": Command("boolean 'A - B' image.ebpo.h5 image.ebpo.h5 --pose 'B 0.5 0 0' "
                            "--memory 128M --volume -o OUT.ply", ("OUT.ply",)),
-    "scene check": Command("scene check --threads 1 a.scene.json"),
-    "scene pairs": Command("scene pairs --threads 1 a.scene.json"),
-    "scene plan": Command("scene plan --threads 1 a.scene.json"),
+    "scene check": Command("scene check a.scene.json"),
+    "scene pairs": Command("scene pairs a.scene.json"),
+    "scene plan": Command("scene plan a.scene.json"),
     "scene approach": Command("scene approach --threads 1 --tolerance 0.1 moves.scene.json"),
     "scene pack": Command("scene pack -q --threads 1 -o OUT a.scene.json", ("OUT/",)),
     "scene report": Command("scene report -q -o OUT.h5 a.scene.json", ("OUT.h5",),

@@ -161,6 +161,56 @@ START_TEST(test_packed_scene_gives_same_results)
 }
 END_TEST
 
+static uint64_t file_reads(const ebpo_scene *scene)
+{
+    uint64_t bytes = 0;
+    for (uint64_t i = 0; ebpo_scene_file(scene, i); i++) {
+        ebpo_file_stats stats = EBPO_FILE_STATS_INIT;
+        ck_assert_int_eq(ebpo_file_get_stats(ebpo_scene_file(scene, i), &stats), EBPO_OK);
+        bytes += stats.bytes_read;
+    }
+    return bytes;
+}
+
+static bool sum_packed(void *user, const ebpo_scene_packed *models, uint64_t count)
+{
+    uint64_t *sums = user; /* written and read bytes */
+    for (uint64_t i = 0; i < count; i++) {
+        sums[0] += models[i].bytes;
+        sums[1] += models[i].bytes_read;
+    }
+    return true;
+}
+
+static bool ignore_needs(void *user, const ebpo_scene_need *needs, uint64_t count)
+{
+    (void)user;
+    (void)needs;
+    return count > 0;
+}
+
+/* Packing searches the needs as a plan does, and then reads the needed bytes. With a target size,
+ * files are written twice, and the reads of both times count. */
+START_TEST(test_packing_counts_all_reads)
+{
+    uint64_t sums[2][2] = { 0 };
+    for (int reduced = 0; reduced < 2; reduced++) {
+        ebpo_pack_options how = EBPO_PACK_OPTIONS_INIT;
+        ebpo_scene *scene = some_scene(1);
+        how.target_bytes = reduced ? sums[0][0] * 2 / 3 : 0;
+        uint64_t before = file_reads(scene);
+        ASSERT_OK(ebpo_scene_plan(scene, 0, LAST, NULL, ignore_needs, NULL, error));
+        uint64_t planned = file_reads(scene) - before;
+        ASSERT_OK(ebpo_scene_pack(scene, scratch("packed"), 0, LAST, &how, sum_packed,
+                                  sums[reduced], error));
+        ck_assert_uint_eq(sums[reduced][1], file_reads(scene) - before - 2 * planned);
+        ebpo_scene_free(scene);
+        scratch_remove(scratch("packed"));
+    }
+    ck_assert_uint_le(sums[1][0], sums[0][0] * 2 / 3);
+}
+END_TEST
+
 /* A scene is packed for one time only. Another time gives the same result as the original scene,
  * or an error. */
 START_TEST(test_packed_scene_refuses_omitted_time)
@@ -359,6 +409,7 @@ TEST_SUITE(scene_routes)
     tcase_add_checked_fixture(tests, begin, scratch_leave);
     tcase_set_timeout(tests, 900);
     tcase_add_test(tests, test_packed_scene_gives_same_results);
+    tcase_add_test(tests, test_packing_counts_all_reads);
     tcase_add_test(tests, test_packed_scene_refuses_omitted_time);
     tcase_add_test(tests, test_approach_finds_every_pair);
     tcase_add_test(tests, test_approach_distance_bounds_hold);

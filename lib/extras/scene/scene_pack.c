@@ -288,7 +288,7 @@ static uint64_t bytes_read(const ebpo_file *file)
     return s.bytes_read;
 }
 
-/* Writes the needed content of a model's file. target: greatest size in bytes; 0: no limit. */
+/* Writes the needed content of a model's file, and adds what was read. target: greatest size in bytes; 0: no limit. */
 static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
@@ -304,7 +304,7 @@ static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
     o.threads = p->options.threads;
     o.progress = p->options.progress;
     ebpo_status status = ebpo_subset(file, path, &o, p->error);
-    out->bytes_read = bytes_read(file) - before;
+    out->bytes_read += bytes_read(file) - before;
     out->source_bytes = ebpo_file_info(file)->file_bytes;
     memcpy(out->source_digest, ebpo_file_info(file)->content_sha256, sizeof out->source_digest);
     if (status == EBPO_OK)

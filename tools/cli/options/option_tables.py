@@ -22,7 +22,7 @@ lines of mdoc for the man page:
       key KEY                 in shared.options: name for `use`; default: NAME
     (mdoc)                    for the man page; default: the help
     use KEY...                shared options; mdoc is added after that of the last one
-      of TYPE                 as above
+      of TYPE, only WORD...   as above
       in MEMBER.              prefix of their fields
       set NAME TEXT           replaces {NAME} in help and mdoc
     group KEY                 in shared.options: `use KEY` uses several options
@@ -100,6 +100,10 @@ def fact(where, facts, word, default=None):
     return found[0] if found else default
 
 
+def short_help(only, text):
+    return (", ".join(only) + ": " if only else "") + text
+
+
 def read_option(where, head, facts, man):
     rest = head[2:]
     letter = rest.pop(0)[1] if rest and re.fullmatch(r"-[a-zA-Z]", rest[0]) else ""
@@ -118,7 +122,7 @@ def read_option(where, head, facts, man):
         if name not in KINDS + ("help", "key", "of", "only"):
             raise Wrong(f"{where}: '{name}' unknown line of an option")
     only = fact(where, facts, "only", "").split()
-    short = (", ".join(only) + ": " if only else "") + fact(where, facts, "help")
+    short = short_help(only, fact(where, facts, "help"))
     return Option(where=where, name=head[1], letter=letter, value=" ".join(rest), kind=kind,
                   field=words[0], help=short, of=fact(where, facts, "of", ""), man=man, only=only, page="",
                   **more)
@@ -150,12 +154,13 @@ class Shared:
             out += self.texts[key[1]] if key else [line]
         return out
 
-    def take(self, where, key, member, sets, of="", page=""):
+    def take(self, where, key, member, sets, of="", page="", only=()):
         if key not in self.options:
             raise Wrong(f"{where}: shared option '{key}' not found")
         self.used.add(key)
         option = Option(**self.options[key].__dict__)
         option.of, option.field, option.page = of, member + option.field, page
+        option.only = list(only)
 
         def filled(text):
             for name, value in sets:
@@ -163,21 +168,22 @@ class Shared:
             if re.search(r"\{[a-z]+\}", text):
                 raise Wrong(f"{where}: '{key}' needs a line 'set': {text}")
             return text
-        option.help = filled(option.help)
+        option.help = short_help(option.only, filled(option.help))
         option.man = [filled(line) for line in self.mdoc(where, option.man)]
         return option
 
     def use(self, where, head, facts, man):
         """Returns the lists of options that a record `use` adds to Command.runs."""
         member, of = fact(where, facts, "in", ""), fact(where, facts, "of", "")
+        only = fact(where, facts, "only", "").split()
         sets = [text.partition(" ")[::2] for name, text in facts if name == "set"]
         runs = []
         for key in head[1:]:
             if key in self.groups:
                 keys, about, page = self.groups[key]
-                runs.append(([self.take(where, k, member, sets, of, page) for k in keys], about))
+                runs.append(([self.take(where, k, member, sets, of, page, only) for k in keys], about))
             else:
-                runs.append(([self.take(where, key, member, sets, of)], None))
+                runs.append(([self.take(where, key, member, sets, of, only=only)], None))
         if man:
             runs[-1][0][-1].man += self.mdoc(where, man)
         return runs
