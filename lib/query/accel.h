@@ -272,6 +272,8 @@ typedef struct ebpo_accel {
     uint32_t *gray_planes;
     uint32_t *gray_first; /* [gray_count + 1] */
     uint64_t gray_count;
+    void *arrays; /* the allocation of all arrays above, except child tables and kinds; NULL: each
+                   * array is a separate allocation */
     /* total bytes of memory. The planes of leaves (ebpo_leaf_kinds) are not counted in a whole
      * model; in a subtree, the most bytes that they can take are counted. */
     uint64_t bytes;

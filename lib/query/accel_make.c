@@ -615,6 +615,53 @@ static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info
     return status;
 }
 
+/* Copies an array to *to, frees the array, and moves *to behind the copy. Returns the copy. */
+static void *move_array(char **to, void *array, uint64_t bytes)
+{
+    void *copy = *to;
+    if (!array)
+        return NULL;
+    memcpy(copy, array, bytes);
+    free(array);
+    *to += bytes;
+    return copy;
+}
+
+/* Moves the arrays of a subtree to one allocation. A cache of subtrees frees and allocates all the
+ * time. With an allocation for each array, the free memory is soon in many small pieces, and the
+ * allocator takes up to a third of the time of a load to find pieces that fit. Does nothing if the
+ * quota is too small for the subtree and copies of its arrays, or if memory is short. */
+static void join_arrays(ebpo_accel *s, const ebpo_quota *space)
+{
+    uint64_t meshlets = (s->units + 1) * EBPO_MESHLET_UNIT,
+             bounds = s->bound_count * (uint64_t)sizeof *s->bound,
+             cylinders = s->bound_count * (uint64_t)sizeof *s->cylinder,
+             list = s->list_count * sizeof *s->list, leaves = s->leaf_count * sizeof *s->leaf,
+             shared = (uint64_t)s->shared_count * sizeof *s->shared,
+             source = s->face_source ? (uint64_t)s->face_count * sizeof *s->face_source : 0,
+             first = s->gray_first ? (s->gray_count + 1) * sizeof *s->gray_first : 0,
+             planes = s->gray_first
+                          ? s->gray_first[s->gray_count] * (uint64_t)sizeof *s->gray_planes
+                          : 0,
+             all = meshlets + bounds + cylinders + list + leaves + shared + source + first + planes;
+    all = (all + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT * EBPO_MESHLET_UNIT;
+    s->arrays =
+        space && s->bytes + all > space->most ? NULL : aligned_alloc(EBPO_MESHLET_UNIT, all);
+    if (!s->arrays)
+        return;
+    /* in the order of the alignments, so that there is no space between the arrays */
+    char *to = s->arrays;
+    s->meshlets = move_array(&to, s->meshlets, meshlets);
+    s->bound = move_array(&to, s->bound, bounds);
+    s->cylinder = move_array(&to, s->cylinder, cylinders);
+    s->list = move_array(&to, (void *)s->list, list);
+    s->leaf = move_array(&to, s->leaf, leaves);
+    s->shared = move_array(&to, s->shared, shared);
+    s->face_source = move_array(&to, s->face_source, source);
+    s->gray_first = move_array(&to, s->gray_first, first);
+    s->gray_planes = move_array(&to, s->gray_planes, planes);
+}
+
 ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
                             bool with_planes, unsigned threads, ebpo_error *error)
 {
@@ -659,6 +706,8 @@ ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const eb
     if (s->root.cell.level == 0)
         ebpo_node_table_make_grid(&s->nodes);
     s->bytes = count_bytes(s);
+    if (s->root.cell.level > 0)
+        join_arrays(s, space);
     *out = s;
     return EBPO_OK;
 }
@@ -668,15 +717,18 @@ void ebpo_accel_free(ebpo_accel *s)
     if (!s)
         return;
     ebpo_node_table_free(&s->nodes);
-    free(s->leaf);
-    free(s->list);
     ebpo_leaf_kinds_free(s->kinds);
-    free(s->meshlets);
-    free(s->bound);
-    free(s->cylinder);
-    free(s->shared);
-    free(s->face_source);
-    free(s->gray_planes);
-    free(s->gray_first);
+    if (!s->arrays) {
+        free(s->leaf);
+        free(s->list);
+        free(s->meshlets);
+        free(s->bound);
+        free(s->cylinder);
+        free(s->shared);
+        free(s->face_source);
+        free(s->gray_planes);
+        free(s->gray_first);
+    }
+    free(s->arrays);
     free(s);
 }

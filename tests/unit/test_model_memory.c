@@ -195,6 +195,7 @@ typedef struct reading {
     ebpo_top *top;
     ebpo_chunks *chunks;
     uint64_t kept, refused, beyond;
+    uint64_t joined; /* number of subtrees whose arrays are in one allocation */
 } reading;
 
 static ebpo_accel *read_within(const reading *r, const ebpo_node *node, ebpo_quota *space)
@@ -234,6 +235,7 @@ static void check_subtree(reading *r, const ebpo_node *node)
     }
     ck_assert_uint_le(subtree->bytes, space.most);
     r->kept += subtree->bytes;
+    r->joined += subtree->arrays != NULL;
     r->beyond += subtree->bytes > keep;
     ebpo_accel_free(subtree);
 }
@@ -276,8 +278,9 @@ static void check_near(const char *name, ebpo_mesh mesh)
         reading r = check_subtrees(&m, cut_level);
         double mean = (double)r.kept / (double)r.top->below_count;
         if (getenv("EBPO_TEST_SHOW"))
-            printf("%s %d: %.0f of %llu, %llu refused\n", name, cut_level, mean,
-                   (unsigned long long)plan.subtree_bytes, (unsigned long long)r.refused);
+            printf("%s %d: %.0f of %llu, %llu refused, %llu of %llu joined\n", name, cut_level,
+                   mean, (unsigned long long)plan.subtree_bytes, (unsigned long long)r.refused,
+                   (unsigned long long)r.joined, (unsigned long long)r.top->below_count);
         ck_assert_uint_eq(plan.subtrees, r.top->below_count);
         ck_assert_msg((double)plan.subtree_bytes >= mean &&
                           (double)plan.subtree_bytes <= 1.5 * mean,
@@ -285,6 +288,7 @@ static void check_near(const char *name, ebpo_mesh mesh)
                       (unsigned long long)plan.subtree_bytes);
         ck_assert_uint_eq(r.beyond, 0);
         ck_assert_uint_le(r.refused, r.top->below_count / 50);
+        ck_assert_uint_ge(r.joined, r.top->below_count / 10 * 9);
         ebpo_top_free(r.top);
     }
     query_model_free(&m);

@@ -117,37 +117,18 @@ enum { DEEP_HULLS = 1 << 10 };
 
 /* --- order of subtrees --- */
 
-/* A subtree, with the key of the order in which the file has the subtrees. */
-typedef struct subtree_position {
-    uint64_t code;   /* octcode of the subtree's first cell at the deepest level */
-    uint32_t number; /* index of the subtree */
-} subtree_position;
-
-/* Compares the codes of two subtrees for qsort. */
-static int by_code(const void *x, const void *y)
+/* Sets the ranks of the subtrees at and below a node. next: rank of the first of them. Returns the
+ * rank after the last of them. */
+static uint32_t rank_subtrees(ebpo_posed_subtrees *s, const ebpo_posed_node *node, uint32_t next)
 {
-    const subtree_position *p = x, *q = y;
-    return (p->code > q->code) - (p->code < q->code);
-}
-
-/* Sets the ranks of all subtrees. */
-static ebpo_status order_subtrees(ebpo_posed_subtrees *s, ebpo_error *error)
-{
-    const ebpo_top *top = s->model->top;
-    subtree_position *at = ebpo_alloc(s->count, sizeof *at);
-    if (!at)
-        return ebpo_fail_memory(error, s->count * sizeof *at);
-    for (uint64_t i = 0; i < s->count; i++) {
-        ebpo_octcode code = ebpo_octcode_of_cell(top->below[i].cell);
-        at[i] =
-            (subtree_position){ ebpo_octcode_first_descendant(code, EBPO_MAX_LEVEL), (uint32_t)i };
+    ebpo_entry_kind kind = ebpo_entry_kind_of(node->entry);
+    if (kind == EBPO_ENTRY_SUBTREE_ROOT)
+        s->rank[ebpo_entry_value(node->entry)] = next++;
+    for (unsigned octant = 0; kind == EBPO_ENTRY_GRAY && octant < 8; octant++) {
+        ebpo_posed_node child = ebpo_posed_child(s, node, octant);
+        next = rank_subtrees(s, &child, next);
     }
-    if (s->count)
-        qsort(at, s->count, sizeof *at, by_code);
-    for (uint64_t i = 0; i < s->count; i++)
-        s->rank[at[i].number] = (uint32_t)i;
-    free(at);
-    return EBPO_OK;
+    return next;
 }
 
 ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out, const ebpo_model *model,
@@ -158,7 +139,10 @@ ebpo_status ebpo_posed_subtrees_make(ebpo_posed_subtrees *out, const ebpo_model 
     out->rank = ebpo_alloc_zero(out->count, sizeof *out->rank);
     if (!out->rank)
         return ebpo_fail_memory(error, out->count * sizeof *out->rank);
-    return model->whole ? EBPO_OK : order_subtrees(out, error);
+    ebpo_posed_node root = ebpo_posed_root(out);
+    if (!model->whole)
+        (void)rank_subtrees(out, &root, 0);
+    return EBPO_OK;
 }
 
 void ebpo_posed_subtrees_free(ebpo_posed_subtrees *s)
@@ -244,12 +228,6 @@ double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell)
 {
     return ebpo_vec3_scaled_length(s->model->info->box_size) * s->posing.scale /
            (double)(1u << cell.level);
-}
-
-double ebpo_posed_shortest_side(const ebpo_posed_subtrees *s, ebpo_cell cell)
-{
-    const double *size = s->model->info->box_size;
-    return fmin(size[0], fmin(size[1], size[2])) * s->posing.scale / (double)(1u << cell.level);
 }
 
 /* --- envelopes --- */

@@ -88,7 +88,5 @@ void ebpo_posed_ends(const ebpo_posed_subtrees *s, ebpo_cell cell, double out[3]
 double ebpo_posed_slack(const ebpo_posed_subtrees *s, ebpo_cell cell, double max_coordinate);
 /* Returns the length of the cell's diagonal in the world. */
 double ebpo_posed_diagonal(const ebpo_posed_subtrees *s, ebpo_cell cell);
-/* Returns the length of the cell's shortest side in the world. */
-double ebpo_posed_shortest_side(const ebpo_posed_subtrees *s, ebpo_cell cell);
 
 #endif

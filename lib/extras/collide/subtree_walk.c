@@ -5,7 +5,8 @@
  * pairs of subtrees whose envelopes may have a common point must be searched. The envelopes of the
  * first levels below the roots of subtrees (deep bounds, query/nearest.h), if they are in memory,
  * must also have a common point. If both subtrees were loaded before, the boxes and cylinders of
- * their skeletons must intersect, too.
+ * their skeletons must intersect, too. This is tested again before each load, because the query
+ * itself makes skeletons.
  *
  * For all pairs of faces, these pairs of subtrees are found before any subtree is loaded, and are
  * sorted so that a loaded subtree is used again soon. If many subtrees were never loaded, the deep
@@ -64,7 +65,7 @@ typedef struct subtree_walk {
     stored_pair *stored; /* [count] pairs of faces of the last pair of subtrees, in no order */
     uint64_t count, capacity;
     uint64_t first_end; /* greater than the indices of all faces that the first subtree of the last
-                         * pair lists */
+                         * pair lists; 0: not known */
     bool late;          /* the deadline passed before all pairs were found */
     ebpo_skeleton_accel skeleton[2]; /* skeletons of a pair of subtrees that may be loaded */
 } subtree_walk;
@@ -95,16 +96,63 @@ static double slack_of(const subtree_pair_search *f, const ebpo_posed_node node[
            ebpo_posed_slack(f->side[1], node[1].cell, f->collision->max_coordinate);
 }
 
-/* Returns true if the cells of two nodes are certainly apart. */
+/* The posed cells of two nodes, which are boxes. */
+typedef struct posed_cells {
+    double axis[2][3][3]; /* [model][edge] directions of the edges, about 1 long */
+    double side[2][3];    /* [model][edge] lengths of the edges */
+    double between[3];    /* twice the difference of the middles */
+    double margin;        /* of rounding errors, and of posed faces and envelopes */
+} posed_cells;
+
+/* Returns the posed cells of two nodes. */
+static posed_cells posed_cells_of(const subtree_pair_search *f, const ebpo_posed_node node[2])
+{
+    posed_cells out = { .margin = 3 * slack_of(f, node) };
+    double ends[2][3];
+    for (int i = 0; i < 2; i++) {
+        const ebpo_posed_subtrees *s = f->side[i];
+        ebpo_posed_ends(s, node[i].cell, ends[i]);
+        for (int j = 0; j < 3; j++) {
+            out.side[i][j] =
+                s->model->info->box_size[j] * s->posing.scale / (double)(1u << node[i].cell.level);
+            for (int k = 0; k < 3; k++)
+                out.axis[i][j][k] = s->posing.matrix[k][j] / s->posing.scale;
+        }
+    }
+    for (int k = 0; k < 3; k++)
+        out.between[k] = ends[0][k] - ends[1][k];
+    return out;
+}
+
+/* Returns true if two cells are certainly apart along a direction, which is at most about 1 long.
+ */
+static bool apart_along(const posed_cells *c, const double direction[3])
+{
+    double extent = 0; /* sum of the extents of both cells */
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 3; j++)
+            extent += fabs(ebpo_vec3_dot(c->axis[i][j], direction)) * c->side[i][j];
+    return fabs(ebpo_vec3_dot(c->between, direction)) - extent > c->margin;
+}
+
+/* Returns true if the cells of two nodes are certainly apart. Two boxes are apart exactly if they
+ * are apart along an edge of either box or along the vector product of an edge of each (Gottschalk
+ * et al. 1996). */
 static bool cells_apart(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
-    double corner[2][8][3], slack = slack_of(f, node);
-    ebpo_convex convex[2];
-    for (int i = 0; i < 2; i++) {
-        ebpo_posed_cell(f->side[i], node[i].cell, corner[i]);
-        convex[i] = (ebpo_convex){ 8, (const double(*)[3])corner[i] };
-    }
-    return ebpo_convex_gap(&convex[0], &convex[1], slack) > slack;
+    posed_cells c = posed_cells_of(f, node);
+    double direction[3];
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 3; j++)
+            if (apart_along(&c, c.axis[i][j]))
+                return true;
+    for (int j = 0; j < 3; j++)
+        for (int k = 0; k < 3; k++) {
+            ebpo_vec3_cross(c.axis[0][j], c.axis[1][k], direction);
+            if (apart_along(&c, direction))
+                return true;
+        }
+    return false;
 }
 
 /* Returns the sum of the diagonals of two nodes' cells. */
@@ -187,21 +235,14 @@ static bool nodes_apart(ebpo_pair_walk *walk)
     return true;
 }
 
-/* Returns true if the faces of two subtrees, which were loaded before, are certainly apart, by the
- * boxes and cylinders of their skeletons. */
-static bool faces_apart(const subtree_pair_search *f, const ebpo_posed_node node[2])
+/* Returns true if the faces of two hierarchies are certainly apart, by the boxes and cylinders of
+ * their nodes. A hierarchy may be a skeleton. */
+static bool hierarchies_apart(subtree_walk *w, const ebpo_accel *const accel[2])
 {
-    const ebpo_collision *q = f->collision;
+    const ebpo_collision *q = w->collision;
     const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
-    ebpo_pair_walk *walk = &f->walk->walk;
-    const ebpo_accel *accel[2];
+    ebpo_pair_walk *walk = &w->walk;
     ebpo_accel_pair pair;
-    for (int i = 0; i < 2; i++) {
-        accel[i] =
-            hierarchy_of(f->side[i]->model, ebpo_entry_value(node[i].entry), &f->walk->skeleton[i]);
-        if (!accel[i])
-            return false;
-    }
     ebpo_accel_pair_make(&pair, accel, posing, q->max_coordinate);
     if (pair.apart)
         return true;
@@ -210,24 +251,18 @@ static bool faces_apart(const subtree_pair_search *f, const ebpo_posed_node node
     return walk->kernels->start(walk) && nodes_apart(walk);
 }
 
-/* Returns true if boxes around the posed cells of two nodes are certainly apart. */
-static bool boxes_apart(const subtree_pair_search *f, const ebpo_posed_node node[2], double slack)
+/* Returns true if the faces of two subtrees, which were loaded before, are certainly apart, by
+ * their skeletons. */
+static bool faces_apart(const subtree_pair_search *f, const ebpo_posed_node node[2])
 {
-    double twice[2][3], size[2][3]; /* twice the middles of the cells; sizes of the boxes */
+    const ebpo_accel *accel[2];
     for (int i = 0; i < 2; i++) {
-        const ebpo_posed_subtrees *s = f->side[i];
-        ebpo_posed_ends(s, node[i].cell, twice[i]);
-        for (int k = 0; k < 3; k++) {
-            size[i][k] = 0;
-            for (int j = 0; j < 3; j++)
-                size[i][k] += fabs(s->posing.matrix[k][j]) * s->model->info->box_size[j];
-            size[i][k] /= (double)(1u << node[i].cell.level);
-        }
+        accel[i] =
+            hierarchy_of(f->side[i]->model, ebpo_entry_value(node[i].entry), &f->walk->skeleton[i]);
+        if (!accel[i])
+            return false;
     }
-    for (int k = 0; k < 3; k++)
-        if (fabs(twice[0][k] - twice[1][k]) - (size[0][k] + size[1][k]) > 2 * slack)
-            return true;
-    return false;
+    return hierarchies_apart(f->walk, accel);
 }
 
 /* Sets *apart to true if the envelopes of two nodes of deep bounds, or of all pairs of their
@@ -238,7 +273,7 @@ static ebpo_status deep_apart(const subtree_pair_search *f, const ebpo_posed_nod
     ebpo_convex convex[2];
     ebpo_status status = EBPO_OK;
     double slack = slack_of(f, node);
-    *apart = boxes_apart(f, node, slack);
+    *apart = cells_apart(f, node);
     if (*apart)
         return EBPO_OK;
     for (int i = 0; i < 2 && status == EBPO_OK; i++)
@@ -435,7 +470,6 @@ static ebpo_status find_subtree_pairs(const subtree_pair_search *f)
 
 /* A pair of nodes. */
 typedef struct waiting_nodes {
-    double apart; /* of the nodes, as subtree_pair.apart */
     double bound; /* lower bound of subtree_pair.apart of all pairs of subtrees below the nodes */
     ebpo_posed_node node[2];
     uint32_t rank[2]; /* if both nodes are roots of subtrees: ranks of the subtrees */
@@ -478,17 +512,6 @@ static double least_diagonal(const ebpo_posed_subtrees *s)
     return ebpo_posed_diagonal(s, (ebpo_cell){ .level = level });
 }
 
-/* Returns true if the cells of a pair are certainly apart. They have a common point if the middles
- * are closer than half the sum of the shortest sides; this quick test is sufficient for most pairs.
- */
-static bool waiting_apart(const subtree_pair_search *f, const waiting_nodes *pair)
-{
-    double sides = 0;
-    for (int i = 0; i < 2; i++)
-        sides += ebpo_posed_shortest_side(f->side[i], pair->node[i].cell);
-    return pair->apart * diagonals_of(f, pair->node) >= sides && cells_apart(f, pair->node);
-}
-
 /* Adds a pair of nodes to the heap, unless their cells are in balls that are certainly apart.
  * bound: bound of the nodes that contain them. */
 static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], double bound)
@@ -500,14 +523,12 @@ static ebpo_status push_nodes(nearest_pairs *p, const ebpo_posed_node node[2], d
             return EBPO_OK;
         added.ends = added.ends && ebpo_entry_kind_of(node[i].entry) == EBPO_ENTRY_SUBTREE_ROOT;
     }
-    double sum = diagonals_of(f, node);
-    added.apart = apart_of(f, node);
-    if ((added.apart - 1) * sum > 0x1p-40 * sum + 4 * slack_of(f, node))
+    double sum = diagonals_of(f, node), apart = apart_of(f, node);
+    if ((apart - 1) * sum > 0x1p-40 * sum + 4 * slack_of(f, node))
         return EBPO_OK;
     for (int i = 0; added.ends && i < 2; i++)
         added.rank[i] = f->side[i]->rank[ebpo_entry_value(node[i].entry)];
-    added.bound =
-        added.ends ? added.apart : fmax(bound, apart_bound(f, added.apart, sum, p->least));
+    added.bound = added.ends ? apart : fmax(bound, apart_bound(f, apart, sum, p->least));
     if (!ebpo_grow(&p->heap, &p->capacity, p->count + 1, sizeof *p->heap))
         return ebpo_fail_memory(f->error, (p->count + 1) * sizeof *p->heap);
     nearest_add(p->heap, p->count++, &added);
@@ -562,7 +583,7 @@ static ebpo_status next_nearest(nearest_pairs *p, subtree_pair *out, bool *more)
     *more = false;
     while (status == EBPO_OK && p->count && !p->late) {
         waiting_nodes next = nearest_take(p->heap, p->count--);
-        bool apart = waiting_apart(&p->search, &next);
+        bool apart = cells_apart(&p->search, next.node);
         if (!apart && next.ends) {
             status = envelopes_apart(&p->search, next.node, &apart);
             p->late = ebpo_collision_is_late(p->search.collision);
@@ -707,20 +728,74 @@ static ebpo_status walk_hierarchies(subtree_walk *w, const ebpo_accel *const acc
     return store_pairs(w, accel, error);
 }
 
-/* Loads a pair of subtrees, and finds their pairs of intersecting faces. */
+/* Returns true if a subtree can be used without loading it. */
+static bool is_in_memory(const subtree_walk *w, int side, uint32_t number)
+{
+    const ebpo_context *c = w->context[side];
+    return !c || ebpo_context_has_pinned(c, number) ||
+           ebpo_cache_has(c->model->cache, ebpo_context_key(c, number));
+}
+
+/* Returns the side of a pair whose subtree is loaded next: a subtree in memory, otherwise a subtree
+ * that was never loaded. accel[side]: NULL if the subtree has not been loaded for this pair.
+ * known[side]: NULL if the subtree was never loaded. */
+static int next_side(const subtree_walk *w, const uint32_t number[2],
+                     const ebpo_accel *const accel[2], const ebpo_accel *const known[2])
+{
+    for (int side = 0; side < 2; side++)
+        if (!accel[side] && is_in_memory(w, side, number[side]))
+            return side;
+    return accel[0] || (!accel[1] && known[0] && !known[1]);
+}
+
+/* Loads a pair of subtrees. Sets *apart to true if the faces of both subtrees are certainly apart;
+ * then one or both subtrees may not have been loaded. Before each load, this is tested with the
+ * bounds of the faces of both subtrees. Bounds of a subtree that is not in memory come from its
+ * skeleton, which an earlier pair of this query may have made. */
+static ebpo_status load_pair(subtree_walk *w, const uint32_t number[2], const ebpo_accel *accel[2],
+                             bool *apart, ebpo_error *error)
+{
+    ebpo_status status = EBPO_OK;
+    accel[0] = accel[1] = NULL;
+    *apart = false;
+    while (status == EBPO_OK && !(accel[0] && accel[1])) {
+        const ebpo_accel *known[2];
+        for (int i = 0; i < 2; i++)
+            known[i] = accel[i] ? accel[i]
+                                : hierarchy_of(w->collision->model[i], number[i], &w->skeleton[i]);
+        int side = next_side(w, number, accel, known);
+        *apart = known[0] && known[1] && !is_in_memory(w, side, number[side]) &&
+                 hierarchies_apart(w, known);
+        if (*apart)
+            return EBPO_OK;
+        status = load_subtree(w, side, number[side], &accel[side], error);
+        if (status == EBPO_OK && accel[side]->bound_count == 0) { /* it has no faces */
+            *apart = true;
+            return EBPO_OK;
+        }
+    }
+    return status;
+}
+
+/* Finds the pairs of intersecting faces of a pair of subtrees, which are loaded if necessary. */
 static ebpo_status subtree_walk_pair(subtree_walk *w, const subtree_pair *pair, ebpo_error *error)
 {
+    const uint32_t number[2] = { pair->a, pair->b };
     const ebpo_accel *accel[2];
+    bool apart = false;
+    ebpo_status status;
     w->count = 0;
-    ebpo_status status = load_subtree(w, 0, pair->a, &accel[0], error);
-    if (status == EBPO_OK && w->self && pair->a == pair->b)
+    w->first_end = 0;
+    if (w->self && pair->a == pair->b) {
+        status = load_subtree(w, 0, pair->a, &accel[0], error);
         accel[1] = accel[0];
-    else if (status == EBPO_OK)
-        status = load_subtree(w, 1, pair->b, &accel[1], error);
-    if (status != EBPO_OK)
+    } else {
+        status = load_pair(w, number, accel, &apart, error);
+    }
+    if (status != EBPO_OK || apart)
         return status;
     w->first_end = accel[0]->first_face + (accel[0]->face_count - accel[0]->shared_count);
-    if (accel[0]->bound_count == 0 || accel[1]->bound_count == 0)
+    if (accel[0]->bound_count == 0)
         return EBPO_OK;
     return walk_hierarchies(w, accel, error);
 }
@@ -821,7 +896,8 @@ static ebpo_status keep_pairs(gathering_parts *g, const subtree_pair *pair, cons
                               ebpo_error *error)
 {
     (void)pthread_mutex_lock(&g->lock);
-    g->end[pair->a] = w->first_end;
+    if (w->first_end)
+        g->end[pair->a] = w->first_end;
     ebpo_status status = add_waiting_pairs(g, w, error);
     (void)pthread_mutex_unlock(&g->lock);
     return status;
