@@ -34,8 +34,8 @@ class Queries(Case):
         collider, matrix, p = ebpo.Collider(m, m), np.eye(4), np.array([.1, .2, .3])
         matrix[0, 3] = 9
         pose = ebpo.pose(translation=[9, 0, 0])
-        self.assertLessEqual(steps(lambda: collider.first(pose_b=pose)), 11)
-        self.assertLessEqual(steps(lambda: collider.first(pose_b=matrix)), 13)
+        self.assertLessEqual(steps(lambda: collider.first(pose_b=pose)), 8)
+        self.assertLessEqual(steps(lambda: collider.first(pose_b=matrix)), 10)
         self.assertLessEqual(steps(lambda: m.inside(p)), 27)
         self.assertLessEqual(steps(lambda: m.distance(p)), 42)
         self.assertLessEqual(steps(lambda: m.ray(3 * p, p)), 38)

@@ -209,10 +209,12 @@ class Collider:
             options.pose_b = pose_of(poses[1])
         if deadline:
             options.deadline_ns = nanoseconds(deadline)
-        with self._lock, Reporter(progress) as reported:
-            if progress:
-                options.progress = reported
-            call(function, self._handle, ctypes.byref(options), *arguments)
+        with self._lock:
+            if not progress:
+                call(function, self._handle, ctypes.byref(options), *arguments)
+                return
+            with Reporter(progress) as options.progress:
+                call(function, self._handle, ctypes.byref(options), *arguments)
 
     def first(self, pose_a: Pose | None = None, pose_b: Pose | None = None) -> tuple[int, int, c.PairKind] | None:
         """Return one pair of intersecting faces: face of a, face of b, kind.
