@@ -2,7 +2,9 @@
 """Checks that queries from Python return the command's results, for any arrays and threads."""
 import concurrent.futures
 import ctypes
+import pathlib
 import pickle
+import sys
 
 from package_support import Case, command_results, model, np, points, run
 
@@ -12,7 +14,32 @@ from ebpo._library import lib
 P = points(20_000)
 
 
+def steps(function):
+    """Return the number of the package's Python functions that a call runs, after a first call."""
+    folder, entered = str(pathlib.Path(ebpo.__file__).parent), []
+    function()
+    sys.setprofile(lambda frame, event, _: entered.append(frame.f_code.co_name)
+                   if event == "call" and frame.f_code.co_filename.startswith(folder) else None)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return len(entered)
+
+
 class Queries(Case):
+    def test_number_of_steps(self):
+        """A query of one item runs few Python functions, which cost more than the library's function."""
+        m = model("scan")
+        collider, matrix, p = ebpo.Collider(m, m), np.eye(4), np.array([.1, .2, .3])
+        matrix[0, 3] = 9
+        pose = ebpo.pose(translation=[9, 0, 0])
+        self.assertLessEqual(steps(lambda: collider.first(pose_b=pose)), 8)
+        self.assertLessEqual(steps(lambda: collider.first(pose_b=matrix)), 10)
+        self.assertLessEqual(steps(lambda: m.inside(p)), 27)
+        self.assertLessEqual(steps(lambda: m.distance(p)), 42)
+        self.assertLessEqual(steps(lambda: m.ray(3 * p, p)), 38)
+
     def test_inside_equals_the_command(self):
         m = model("scan")
         expected = command_results("inside", "scan", P)

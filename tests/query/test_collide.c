@@ -8,8 +8,21 @@
 #include <ebpo/collide.h>
 
 #include "check_main.h"
+#include "core/simd.h"
+#include "extras/collide/collider.h"
 #include "geometry/triangle_pair.h"
 #include "query_support.h"
+
+/* Kernels that count how many sides of boxes they decode for eight children at a time. */
+static uint64_t decoded_sides;
+EBPO_EIGHT f8 decode_sides(const uint8_t *x)
+{
+    decoded_sides++;
+    return f8_from_bytes(x);
+}
+#define f8_from_bytes      decode_sides
+#define EBPO_KERNEL_SUFFIX counted
+#include "extras/collide/pair_walk_kernels.c"
 
 enum { POSES = 12 };
 
@@ -581,6 +594,32 @@ START_TEST(test_collide_bad_pose_and_cancel)
 }
 END_TEST
 
+START_TEST(test_collide_keeps_transformed_nodes)
+{
+    query_model m;
+    ebpo_collider *c;
+    ebpo_collision q;
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_accel_pair pair;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[0]);
+    ASSERT_OK(ebpo_collider_new(m.model, m.model, NULL, &c, error));
+    options.pose_b.translation[0] = m.size / 2;
+    ASSERT_OK(ebpo_collision_begin(&q, c, &options, error));
+    const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
+    const ebpo_block_posing *posing[2] = { &q.posing[0], &q.posing[1] };
+    ebpo_accel_pair_make(&pair, accel, posing, q.max_coordinate);
+    ebpo_pair_walk_begin(&c->walk, &pair);
+    c->walk.kernels = &ebpo_walk_kernels_counted;
+    decoded_sides = 0;
+    ck_assert(c->walk.kernels->start(&c->walk) && c->walk.kernels->run(&c->walk, UINT64_MAX));
+    uint64_t transformed = decoded_sides / 6; /* two sides on each axis */
+    ck_assert_uint_eq(c->walk.node_pairs, 126);
+    ck_assert_uint_le(transformed, 60); /* 106 with half of EBPO_TURNED_NODES */
+    ebpo_collider_free(c);
+    query_model_free(&m);
+}
+END_TEST
+
 TEST_SUITE(collide)
 {
     TCase *tests = tcase_create("collide"), *threads = tcase_create("threads"),
@@ -594,6 +633,7 @@ TEST_SUITE(collide)
     tcase_add_test(nested, test_collide_boxes_overlap_without_contact);
     tcase_add_test(tests, test_collide_levels_bound_result);
     tcase_add_test(tests, test_collide_bad_pose_and_cancel);
+    tcase_add_test(tests, test_collide_keeps_transformed_nodes);
     Suite *suite = suite_create("collide");
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);

@@ -8,6 +8,16 @@
 #include "check_main.h"
 #include "query_support.h"
 
+/* Counts calls of frexp, which only far points need; the linker passes calls to __wrap_. */
+static uint64_t exponents;
+double __real_frexp(double x, int *exponent);
+double __wrap_frexp(double x, int *exponent);
+double __wrap_frexp(double x, int *exponent)
+{
+    exponents++;
+    return __real_frexp(x, exponent);
+}
+
 /* The models: curved models; flat sides with many faces, seen from far points; repeated faces; and
  * the smallest and greatest doubles as coordinates. */
 static const struct {
@@ -185,6 +195,35 @@ START_TEST(test_distant_point_levels_and_deadlines)
 }
 END_TEST
 
+/* Returns the number of calls of frexp for the distance of a point. */
+static uint64_t exponents_at(const query_model *m, const double p[3])
+{
+    ebpo_distance_result got;
+    exponents = 0;
+    ASSERT_OK(ebpo_distance(m->context, p, NULL, &got, error));
+    return exponents;
+}
+
+START_TEST(test_near_points_need_no_exponents)
+{
+    query_model m;
+    double middle[3];
+    uint64_t state = 1;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[0]);
+    middle_of(&m, middle);
+    for (int i = 0; i < 100; i++) {
+        double p[3], far[3];
+        for (int k = 0; k < 3; k++) {
+            p[k] = middle[k] + 3 * either(&state) * m.info.box_size[k];
+            far[k] = middle[k] + (k == i % 3 ? 20 * m.info.box_size[k] : 0);
+        }
+        ck_assert_uint_eq(exponents_at(&m, p), 0);
+        ck_assert_uint_ge(exponents_at(&m, far), 2);
+    }
+    query_model_free(&m);
+}
+END_TEST
+
 TEST_SUITE(query_distant)
 {
     Suite *suite = suite_create("query_distant");
@@ -193,6 +232,7 @@ TEST_SUITE(query_distant)
     tcase_add_loop_test(tests, test_distant_points_ignore_load_mode, 0, CASES);
     tcase_add_loop_test(tests, test_distant_point_limits_are_exact, 0, CASES);
     tcase_add_loop_test(tests, test_distant_point_levels_and_deadlines, 0, CASES);
+    tcase_add_test(tests, test_near_points_need_no_exponents);
     suite_add_tcase(suite, tests);
     return suite;
 }

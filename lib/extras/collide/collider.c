@@ -193,7 +193,7 @@ void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)
     w->top = w->group = w->found_count = 0;
     w->begin = 0;
     w->end = pair->accel[0]->face_count;
-    for (int i = 0; i < 2 * EBPO_TURNED_NODES; i++)
-        w->turned[i / EBPO_TURNED_NODES][i % EBPO_TURNED_NODES].node = EBPO_NO_CHILD;
+    for (int i = 0; i < EBPO_TURNED_NODES; i++)
+        w->turned_node[0][i] = w->turned_node[1][i] = EBPO_NO_CHILD;
     ebpo_posed_faces_forget(w->posed);
 }

@@ -555,8 +555,8 @@ EBPO_EIGHT bool add_candidates(ebpo_gap_search *g, f8 low, unsigned used, const 
 /* Visits the pairs of faces of two blocks. Returns false to end the walk. */
 static bool visit_blocks(ebpo_gap_search *g, const uint32_t block[2])
 {
-    const ebpo_posed_faces *a = posed_faces_of(g->faces[0], g->accel[0], &g->posing[0], block[0]),
-                           *b = posed_faces_of(g->faces[1], g->accel[1], &g->posing[1], block[1]);
+    const ebpo_posed_faces *a = posed_faces_of(&g->faces[0], g->accel[0], &g->posing[0], block[0]),
+                           *b = posed_faces_of(&g->faces[1], g->accel[1], &g->posing[1], block[1]);
     float shift[3], no_shift[3] = { 0, 0, 0 }, most = 0;
     for (int k = 0; k < 3; k++) {
         shift[k] = (float)((b->base[k] - a->base[k]) * g->posing[0].unit);

@@ -36,17 +36,17 @@ typedef struct ebpo_turned_node {
     float mid[3][8], mid2[3][8];         /* middles of cylinders */
     float half[8], radius[8];            /* half lengths and radii of cylinders */
     float extent[8];                     /* sums of the half sides of boxes */
-    double origin[3];                    /* the node's origin in the first model's frame, for nodes
-                                          * of both models */
+    double origin[4];                    /* the node's origin in the first model's frame, for nodes
+                                          * of both models; origin[3] is 0 */
     float size;                          /* length of the longest side of all boxes */
-    uint32_t node;                       /* the node's index; EBPO_NO_CHILD: the entry is empty */
+    uint32_t node;                       /* the node's index */
     uint8_t lanes;                       /* a bit for each lane that has a child */
     bool cylinders;                      /* at least one child has a cylinder */
 } ebpo_turned_node;
 
 /* EBPO_TURNED_NODES: number of turned nodes of each model that a walk keeps (a cache).
  * EBPO_TURNED_BITS: its logarithm to the base 2. */
-enum { EBPO_TURNED_BITS = 4, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
+enum { EBPO_TURNED_BITS = 5, EBPO_TURNED_NODES = 1 << EBPO_TURNED_BITS };
 
 typedef struct ebpo_pair_walk ebpo_pair_walk;
 
@@ -83,9 +83,11 @@ struct ebpo_pair_walk {
     uint32_t found_slot[2];                  /* slots of the faces of the last pair found */
     uint64_t node_pairs, block_pairs, exact; /* numbers of visited pairs of nodes and of blocks, and
                                               * of pairs of faces decided by the exact test */
-    /* [model] the last nodes and blocks that the walk has transformed (caches) */
+    /* [model] the last nodes and blocks that the walk has transformed (caches). turned_node: index
+     * of the node in each entry of `turned`; EBPO_NO_CHILD: the entry is empty. */
+    uint32_t turned_node[2][EBPO_TURNED_NODES];
     ebpo_turned_node turned[2][EBPO_TURNED_NODES];
-    ebpo_posed_faces posed[2][EBPO_POSED_FACES];
+    ebpo_posed_cache posed[2];
 };
 
 /* Frees the memory of a walk, which may be used again. */
@@ -178,7 +180,7 @@ struct ebpo_gap_search {
 
     /* [model] the last nodes and blocks that the search has transformed (caches) */
     ebpo_gap_node node[2][EBPO_GAP_NODES];
-    ebpo_posed_faces faces[2][EBPO_POSED_FACES];
+    ebpo_posed_cache faces[2];
 };
 
 /* Allocates a search. Returns NULL if memory is short. */

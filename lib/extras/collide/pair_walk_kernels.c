@@ -9,6 +9,8 @@
  * docs/develop/collision.md, "Going down two hierarchies". */
 #include "core/strict_fp.h"
 
+#include <stddef.h>
+
 #include "core/simd.h"
 #include "extras/collide/hierarchy_walk.h"
 #include "extras/collide/posed_eight.inc"
@@ -52,13 +54,13 @@ EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_b
 }
 
 /* Decodes and rotates the children's bounding cylinders. A child without a cylinder gets a cylinder
- * of extreme length, which excludes no pair. c: middles of the boxes. */
+ * of extreme length, which excludes no pair. c: middles of the boxes. a, inverse, exists: from
+ * decode_axes8. */
 EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
                                     const ebpo_bound_cylinder *b, ebpo_turned_node *out,
-                                    const f8 c[3])
+                                    const f8 c[3], const f8 a[3], f8 inverse, f8 exists)
 {
-    f8 a[3], a2[3], mid[3], mid2[3], inverse, exists, unit = f8_all(p->unit[side]);
-    decode_axes8(b, a, &inverse, &exists);
+    f8 a2[3], mid[3], mid2[3], unit = f8_all(p->unit[side]);
     f8 along = f8_mul(f8_mul(inverse, unit), f8_all(0.5f * b->along_step)),
        from = f8_mul(f8_from_shorts(b->from), along), to = f8_mul(f8_from_shorts(b->to), along);
 #pragma GCC unroll 3
@@ -75,22 +77,35 @@ EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
     store_vector8(out->mid2, mid2);
 }
 
-/* Computes the children of a node in both frames. */
+/* Returns four doubles. */
+EBPO_EIGHT v4d load_doubles(const double x[4])
+{
+    v4d out;
+    memcpy(&out, x, sizeof out);
+    return out;
+}
+
+/* Computes the children of a node in both frames. The axes of cylinders need a square root and a
+ * division, so they are decoded first: the processor computes the boxes meanwhile. */
 static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, ebpo_turned_node *out)
 {
     const ebpo_bound *b = &p->accel[side]->bound[node];
-    f8 c[3];
-    double origin[3];
+    const ebpo_bound_cylinder *cylinders = &p->accel[side]->cylinder[node];
+    f8 c[3], a[3], inverse, exists;
+    decode_axes8(cylinders, a, &inverse, &exists);
     transform_boxes(p, side, b, out, c);
-    out->cylinders = false;
-    if (p->cylinders)
-        transform_cylinders(p, side, &p->accel[side]->cylinder[node], out, c);
-    for (int k = 0; k < 3; k++)
-        origin[k] = (double)b->origin[k] * (double)p->unit[side];
-    for (int i = 0; i < 3; i++)
-        out->origin[i] = side == 0 ? origin[i]
-                                   : p->turn[i][0] * origin[0] + p->turn[i][1] * origin[1] +
-                                         p->turn[i][2] * origin[2] + p->place[i];
+    transform_cylinders(p, side, cylinders, out, c, a, inverse, exists);
+    out->cylinders = out->cylinders && p->cylinders;
+    double unit = (double)p->unit[side], x = (double)b->origin[0] * unit,
+           y = (double)b->origin[1] * unit, z = (double)b->origin[2] * unit;
+    v4d origin = { x, y, z, 0 };
+    if (side == 1)
+        origin = load_doubles(p->column[0]) * v4d_all(x) + load_doubles(p->column[1]) * v4d_all(y) +
+                 load_doubles(p->column[2]) * v4d_all(z) + load_doubles(p->place);
+    /* One store of all four doubles: two_nodes_of loads them together soon, and a processor waits
+     * long for a load that needs several recent stores. The alignment keeps both in one line. */
+    _Static_assert(offsetof(ebpo_turned_node, origin) % 32 == 0, "the origin is aligned");
+    memcpy(out->origin, &origin, sizeof origin);
     out->node = node;
     out->lanes = (uint8_t)((1u << b->count) - 1);
 }
@@ -99,10 +114,12 @@ static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, eb
  */
 EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint32_t node)
 {
-    ebpo_turned_node *out =
-        &w->turned[side][node * UINT32_C(0x9e3779b1) >> (32 - EBPO_TURNED_BITS)];
-    if (__builtin_expect(out->node != node, 0))
+    uint32_t entry = node * UINT32_C(0x9e3779b1) >> (32 - EBPO_TURNED_BITS);
+    ebpo_turned_node *out = &w->turned[side][entry];
+    if (__builtin_expect(w->turned_node[side][entry] != node, 0)) {
         transform_node(w->pair, side, node, out);
+        w->turned_node[side][entry] = node;
+    }
     return out;
 }
 
@@ -111,12 +128,12 @@ EBPO_EIGHT const ebpo_turned_node *turned_node(ebpo_pair_walk *w, int side, uint
 /* Two nodes P and Q, whose children are compared: all children of P with one child of Q. */
 typedef struct two_nodes {
     const ebpo_turned_node *p, *q;
-    float in_p[3];        /* Q's origin minus P's origin, in P's frame */
-    float in_q[3];        /* P's origin minus Q's origin, in Q's frame */
-    float slack;          /* greatest error by which computed gaps of boxes may be too large */
-    float cylinder_slack; /* greatest error by which computed gaps of cylinders may be too large */
-    float sine;           /* 1 plus ebpo_accel_pair.sine_capacity */
-    bool cylinders;       /* a child has a cylinder */
+    float in_p[8];     /* Q's origin minus P's origin, in P's frame, twice; entries 3 and 7 are 0 */
+    float in_q[8];     /* P's origin minus Q's origin, in Q's frame, in the same way */
+    f8 slack;          /* greatest error by which computed gaps of boxes may be too large */
+    f8 cylinder_slack; /* greatest error by which computed gaps of cylinders may be too large */
+    float sine;        /* 1 plus ebpo_accel_pair.sine_capacity */
+    bool cylinders;    /* a child has a cylinder */
 } two_nodes;
 
 /* Prepares the comparison of a, a node of the first model, and b, a node of the second model.
@@ -125,21 +142,18 @@ EBPO_EIGHT two_nodes two_nodes_of(const ebpo_accel_pair *pair, const ebpo_turned
                                   const ebpo_turned_node *b, int p_side)
 {
     two_nodes t = { .p = p_side == 0 ? a : b, .q = p_side == 0 ? b : a };
-    float in_a[3], in_b[3], far = 0;
-    for (int k = 0; k < 3; k++) {
-        in_a[k] = (float)(b->origin[k] - a->origin[k]);
-        float size = in_a[k] < 0 ? -in_a[k] : in_a[k];
-        far = size > far ? size : far;
-    }
-    for (int i = 0; i < 3; i++) {
-        const float *m = pair->into[1][i];
-        in_b[i] = -((m[0] * in_a[0] + m[1] * in_a[1]) + m[2] * in_a[2]);
-    }
-    memcpy(t.in_p, p_side == 0 ? in_a : in_b, sizeof t.in_p);
-    memcpy(t.in_q, p_side == 0 ? in_b : in_a, sizeof t.in_q);
-    float size = a->size + b->size + far;
-    t.slack = 0x1p-18f * size + pair->uncertainty;
-    t.cylinder_slack = pair->cylinder_share * size + pair->uncertainty;
+    v4d between = load_doubles(b->origin) - load_doubles(a->origin);
+    f8 in_a = f8_from_doubles(between, between), x = f8_spread0(in_a), y = f8_spread1(in_a),
+       z = f8_spread2(in_a);
+    f8 in_b = f8_add(f8_add(f8_mul(f8_load_twice(pair->into_column[0]), x),
+                            f8_mul(f8_load_twice(pair->into_column[1]), y)),
+                     f8_mul(f8_load_twice(pair->into_column[2]), z));
+    f8_store(p_side == 0 ? t.in_p : t.in_q, in_a);
+    f8_store(p_side == 0 ? t.in_q : t.in_p, f8_sub(f8_all(0), in_b));
+    f8 size = f8_add(f8_all(a->size + b->size), f8_max3(f8_abs(x), f8_abs(y), f8_abs(z))),
+       uncertainty = f8_all(pair->uncertainty);
+    t.slack = f8_add(f8_mul(f8_all(0x1p-18f), size), uncertainty);
+    t.cylinder_slack = f8_add(f8_mul(f8_all(pair->cylinder_share), size), uncertainty);
     t.sine = 1 + pair->sine_capacity;
     t.cylinders = a->cylinders | b->cylinders;
     return t;
@@ -210,10 +224,10 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
 EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, float key[8])
 {
     f8 gap = box_gaps(t, j);
-    unsigned near = t->p->lanes & ~f8_bits(f8_less(f8_all(t->slack), gap));
+    unsigned near = t->p->lanes & ~f8_bits(f8_less(t->slack, gap));
     if (near && t->cylinders) {
         f8 cylinder = cylinder_gaps(t, j);
-        near &= ~f8_bits(f8_less(f8_all(t->cylinder_slack), cylinder));
+        near &= ~f8_bits(f8_less(t->cylinder_slack, cylinder));
         gap = f8_max(gap, cylinder);
     }
     if (first && near) {
@@ -362,7 +376,7 @@ EBPO_EIGHT bool divide_pair(ebpo_pair_walk *w, ebpo_node_pair r, uint32_t a, uin
 /* Returns the posed faces of a block. */
 static const ebpo_posed_faces *posed_faces(ebpo_pair_walk *w, int side, uint32_t block)
 {
-    return posed_faces_of(w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
+    return posed_faces_of(&w->posed[side], w->pair->accel[side], w->pair->posing[side], block);
 }
 
 /* Computes the faces of a block relative to `origin`, as ebpo_posed_block_place does. Returns a

@@ -125,6 +125,19 @@ static void to_floats(const double m[3][3], float out[3][3], float size[3][3])
     }
 }
 
+/* Rounds the matrices `out->turn` and `back`, its inverse, to floats. */
+static void set_matrices(ebpo_accel_pair *out, const double back[3][3])
+{
+    to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
+    to_floats(back, out->into[1], out->size[1]);
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 4; i++) {
+            out->column[k][i] = i < 3 ? out->turn[i][k] : 0;
+            out->into_column[k][i] = i < 3 ? out->into[1][i][k] : 0;
+        }
+    out->place[3] = 0;
+}
+
 /* Prepares a pair whose frames are too different for floats, or whose coordinates are out of the
  * range of floats. The walk then visits every pair of nodes. */
 static void visit_all_pairs(ebpo_accel_pair *out)
@@ -133,8 +146,7 @@ static void visit_all_pairs(ebpo_accel_pair *out)
     for (int i = 0; i < 9; i++)
         out->turn[i / 3][i % 3] = i % 4 == 0;
     out->place[0] = out->place[1] = out->place[2] = 0;
-    to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
-    to_floats((const double(*)[3])out->turn, out->into[1], out->size[1]);
+    set_matrices(out, (const double(*)[3])out->turn);
     out->uncertainty = INFINITY;
     out->cylinders = out->apart = false;
 }
@@ -196,9 +208,8 @@ void ebpo_accel_pair_make(ebpo_accel_pair *out, const ebpo_accel *const accel[2]
     rotate_vector((const double(*)[3])back, middle, rotated);
     for (int i = 0; i < 3; i++)
         out->place[i] = rotated[i] * unit - accel[0]->centre[i] * (posing[0]->posing.scale * unit);
-    to_floats((const double(*)[3])out->turn, out->into[0], out->size[0]);
     invert_matrix((const double(*)[3])out->turn, back);
-    to_floats((const double(*)[3])back, out->into[1], out->size[1]);
+    set_matrices(out, (const double(*)[3])back);
     double error_bound = posing[0]->posing.error_bound + posing[1]->posing.error_bound;
     out->uncertainty = (float)(0x1p-44 * max_coordinate * unit) + 0x1p-100f;
     out->cylinder_share = (float)(0x1p-17 + 8 * error_bound);

@@ -76,18 +76,23 @@ typedef struct ebpo_posed_faces {
     _Alignas(32) float x[9][8]; /* [3 * corner + axis][lane] */
     double base[3];             /* posed coordinates of the block's first vertex */
     float error, extent;        /* as in ebpo_posed_block */
-    uint32_t block;             /* the block's index; EBPO_NO_CHILD: the entry is empty */
     uint8_t lanes;              /* a bit for each lane that has a face */
 } ebpo_posed_faces;
 
-/* Number of posed blocks of each model that a walk keeps (a cache). */
+/* A cache: the last blocks of a model that a walk has posed. The indices are contiguous, so that a
+ * short query quickly marks all entries as empty. */
 enum { EBPO_POSED_FACES = 32 };
 
-/* Marks all entries of the cache as empty. */
-static inline void ebpo_posed_faces_forget(ebpo_posed_faces faces[2][EBPO_POSED_FACES])
+typedef struct ebpo_posed_cache {
+    uint32_t block[EBPO_POSED_FACES]; /* the block's index; EBPO_NO_CHILD: the entry is empty */
+    ebpo_posed_faces faces[EBPO_POSED_FACES];
+} ebpo_posed_cache;
+
+/* Marks all entries of both models' caches as empty. */
+static inline void ebpo_posed_faces_forget(ebpo_posed_cache cache[2])
 {
-    for (int i = 0; i < 2 * EBPO_POSED_FACES; i++)
-        faces[i / EBPO_POSED_FACES][i % EBPO_POSED_FACES].block = EBPO_NO_CHILD;
+    for (int i = 0; i < EBPO_POSED_FACES; i++)
+        cache[0].block[i] = cache[1].block[i] = EBPO_NO_CHILD;
 }
 
 /* Two accels at their poses, prepared for a walk through both hierarchies together. The coordinates
@@ -103,10 +108,13 @@ typedef struct ebpo_accel_pair {
     const ebpo_block_posing *posing[2];
     float unit[2];     /* factor of lengths in each frame */
     double turn[3][3]; /* matrix from vectors of the second frame to vectors of the first frame */
-    double place[3];   /* origin of the second frame in the first frame */
+    double place[4];   /* origin of the second frame in the first frame; place[3] is 0 */
     /* In floats: into[i] is the matrix from vectors of the other frame to vectors of frame i;
      * size[i] has the absolute values of the entries of into[i], rounded up. */
     float into[2][3][3], size[2][3][3];
+    /* the columns of `turn` and of into[1]; the fourth entries are 0 */
+    double column[3][4];
+    float into_column[3][4];
     float uncertainty; /* bound of the errors of posing and of the matrices, in the common unit of
                         * both frames; INFINITY: no pair of nodes is dropped */
     float cylinder_share; /* distances of cylinders are reduced by this share of the nodes' sizes */

@@ -206,6 +206,8 @@ def checked(entry: Any, kinds: list, names: list) -> Any:
 
 def doubles(values: Any, what: str) -> np.ndarray:
     """Convert numbers to contiguous doubles; contiguous doubles are not copied. Wider floats are rounded."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.c_contiguous:
+        return values
     given = np.asarray(values)
     if given.dtype.kind == "O":
         given = np.array([real(value, what) for value in given.ravel()], np.float64).reshape(given.shape)

@@ -140,7 +140,7 @@ def error_of(error):
 
 def call(name, *arguments):
     """Call a function that can fail, and raises its error."""
-    error = made(c.ebpo_error)
+    error = c.ebpo_error()
     if getattr(lib, name)(*arguments, ctypes.byref(error)) != 0:
         raise error_of(error)
 
@@ -250,11 +250,14 @@ class Reporter(Callback):
     """A progress callback of Python, or None, as a struct of the library."""
 
     def __init__(self, progress):
+        if not progress:
+            self.raised, self.given = None, c.ebpo_progress()
+            return
         from .queries import reporter
         progress = reporter(progress)
         super().__init__(c.ebpo_progress_fn, lambda _user, stage, done, total:
                          progress(text(stage), done, total) is not False)
-        self.given = c.ebpo_progress(self.given if progress else c.ebpo_progress_fn(), None)
+        self.given = c.ebpo_progress(self.given, None)
 
 
 def size_in_bytes(size):

@@ -1,10 +1,10 @@
 """Queries of two models: collision, distance and penetration."""
 from __future__ import annotations
 
-import contextlib
 import ctypes
+import math
 import threading
-from typing import TYPE_CHECKING, Any, Iterator, NamedTuple, Union
+from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 import numpy as np
 
@@ -76,6 +76,11 @@ def number(face: int) -> int:
     return -1 if face == c.EBPO_NO_FACE else face
 
 
+def members_of_pose(value: c.ebpo_pose) -> Doubles:
+    """Return the pose's memory as an array: 9 reals of the rotation, row by row, 3 of the translation, the scale."""
+    return np.frombuffer(value, np.float64)
+
+
 def pose(rotation: ArrayLike | None = None, translation: ArrayLike | None = None, scale: float = 1.0,
          quaternion: ArrayLike | None = None) -> c.ebpo_pose:
     """Return a pose of a model: x becomes rotation (scale x) + translation.
@@ -91,12 +96,13 @@ def pose(rotation: ArrayLike | None = None, translation: ArrayLike | None = None
     [1.0, 2.0, 3.0]
     """
     made_pose = made(c.ebpo_pose, scale=scale)
+    members = members_of_pose(made_pose)
     if rotation is not None and quaternion is not None:
         raise ValueError("a pose has a rotation or a quaternion, not both")
     if rotation is not None:
-        np.ctypeslib.as_array(made_pose.rotation)[:] = doubles(rotation, "rotation").reshape(3, 3)
+        members[:9] = doubles(rotation, "rotation").reshape(9)
     if translation is not None:
-        np.ctypeslib.as_array(made_pose.translation)[:] = doubles(translation, "translation").reshape(3)
+        members[9:12] = doubles(translation, "translation").reshape(3)
     if quaternion is not None:
         turn = doubles(quaternion, "quaternion").reshape(4)
         call("ebpo_pose_turn", ctypes.byref(made_pose), turn.ctypes.data)
@@ -109,19 +115,23 @@ def pose_of(value: Any) -> Any:
     if isinstance(value, c.ebpo_pose):
         return value
     matrix = doubles(value, "a pose")
-    if matrix.shape != (4, 4) or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+    if matrix.shape != (4, 4) or matrix[3].tolist() != [0, 0, 0, 1]:
         raise ValueError("a pose is what ebpo.pose gives, or a (4, 4) matrix whose last row is 0 0 0 1")
-    scale = float(np.linalg.norm(matrix[:3, 0]))
+    column = matrix[:3, 0].copy()
+    scale = math.sqrt(column.dot(column))
     scale = 1.0 if abs(scale - 1) < 2**-30 else scale
     if not scale > 0:
         raise ValueError("the matrix of a pose has no inverse")
-    return pose(matrix[:3, :3] / scale, matrix[:3, 3], scale)
+    made_pose = c.ebpo_pose()
+    members = members_of_pose(made_pose)
+    members[:9], members[9:12], members[12] = (matrix[:3, :3] / scale).ravel(), matrix[:3, 3], scale
+    return made_pose
 
 
 def matrix_of(value: Any) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.ctypeslib.as_array(value.rotation) * value.scale
-    matrix[:3, 3] = np.ctypeslib.as_array(value.translation)
+    matrix, members = np.eye(4), members_of_pose(value)
+    matrix[:3, :3] = members[:9].reshape(3, 3) * members[12]
+    matrix[:3, 3] = members[9:12]
     return matrix
 
 
@@ -189,15 +199,22 @@ class Collider:
     def __reduce__(self) -> tuple[Any, ...]:
         return _again, self._arguments
 
-    @contextlib.contextmanager
-    def _options(self, poses: tuple[Pose | None, Pose | None], deadline: float | None = None,
-                 progress: Progress | None = None, level: int | None = None) -> Iterator[Any]:
-        with self._lock, Reporter(progress) as reported:
-            options = made(c.ebpo_collide_options, pose_a=pose_of(poses[0]), pose_b=pose_of(poses[1]),
-                           deadline_ns=nanoseconds(deadline or 0), progress=reported)
-            if level is not None:
-                options.level = level
-            yield ctypes.byref(options)
+    def _call(self, function: str, poses: tuple[Pose | None, Pose | None], *arguments: Any,
+              deadline: float | None = None, progress: Progress | None = None) -> None:
+        """Call a function of the library with the collider, its options and the arguments."""
+        options = made(c.ebpo_collide_options)
+        if poses[0] is not None:
+            options.pose_a = pose_of(poses[0])
+        if poses[1] is not None:
+            options.pose_b = pose_of(poses[1])
+        if deadline:
+            options.deadline_ns = nanoseconds(deadline)
+        with self._lock:
+            if not progress:
+                call(function, self._handle, ctypes.byref(options), *arguments)
+                return
+            with Reporter(progress) as options.progress:
+                call(function, self._handle, ctypes.byref(options), *arguments)
 
     def first(self, pose_a: Pose | None = None, pose_b: Pose | None = None) -> tuple[int, int, c.PairKind] | None:
         """Return one pair of intersecting faces: face of a, face of b, kind.
@@ -208,21 +225,19 @@ class Collider:
         True
         """
         pair, found = c.ebpo_face_pair(), ctypes.c_int32()
-        with self._options((pose_a, pose_b)) as options:
-            call("ebpo_collide_first", self._handle, options, ctypes.byref(pair), ctypes.byref(found))
+        self._call("ebpo_collide_first", (pose_a, pose_b), ctypes.byref(pair), ctypes.byref(found))
         return (pair.face_a, pair.face_b, c.PairKind(pair.kind)) if found.value == 1 else None
 
     def relation(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, deadline: float | None = None) -> c.Relation:
         """Return the exact Relation of the models. deadline: time limit in seconds; then the result may be UNDECIDED."""
         result = c.ebpo_relation_result()
-        with self._options((pose_a, pose_b), deadline) as options:
-            call("ebpo_collide_relation", self._handle, options, ctypes.byref(result))
+        self._call("ebpo_collide_relation", (pose_a, pose_b), ctypes.byref(result), deadline=deadline)
         return c.Relation(result.relation)
 
     def _pairs(self, function: str, poses: tuple[Pose | None, Pose | None], progress: Progress | None) -> Pairs:
         found = Gathered(c.ebpo_pairs_fn, PAIR)
-        with self._options(poses, None, progress) as options, found as taking:
-            call(function, self._handle, options, taking, None)
+        with found as taking:
+            self._call(function, poses, taking, None, progress=progress)
         pairs = found.array
         return Pairs(pairs["face_a"].astype(np.int64), pairs["face_b"].astype(np.int64), pairs["kind"].copy())
 
@@ -243,8 +258,8 @@ class Collider:
     def contacts(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, progress: Progress | None = None) -> Contacts:
         """Return the intersections: a segment for each pair of crossing faces."""
         found = Gathered(c.ebpo_segments_fn, SEGMENT)
-        with self._options((pose_a, pose_b), None, progress) as options, found as taking:
-            call("ebpo_collide_contacts", self._handle, options, taking, None)
+        with found as taking:
+            self._call("ebpo_collide_contacts", (pose_a, pose_b), taking, None, progress=progress)
         all_of_them = found.array
         return Contacts(all_of_them["point"].copy(), all_of_them["face_a"].astype(np.int64),
                         all_of_them["face_b"].astype(np.int64))
@@ -262,8 +277,8 @@ class Collider:
             lines.append(copied(given.points, (given.count, 3), np.float64))
             return True
 
-        with self._options((pose_a, pose_b)) as options, Callback(c.ebpo_polylines_fn, take) as taking:
-            call("ebpo_collide_polylines", self._handle, options, taking, None)
+        with Callback(c.ebpo_polylines_fn, take) as taking:
+            self._call("ebpo_collide_polylines", (pose_a, pose_b), taking, None)
         return lines
 
     def distance(self, pose_a: Pose | None = None, pose_b: Pose | None = None, *, tolerance: float = 0.0,
@@ -274,8 +289,8 @@ class Collider:
         deadline: time limit in seconds; then the current bounds are returned.
         """
         clearance, out = made(c.ebpo_collide_distance_options, tolerance=tolerance), c.ebpo_collide_distance_result()
-        with self._options((pose_a, pose_b), deadline) as options:
-            call("ebpo_collide_distance", self._handle, options, ctypes.byref(clearance), ctypes.byref(out))
+        self._call("ebpo_collide_distance", (pose_a, pose_b), ctypes.byref(clearance), ctypes.byref(out),
+                   deadline=deadline)
         return Clearance(out.distance.lo, out.distance.hi, number(out.pair.face_a), number(out.pair.face_b),
                          np.array(out.point_a), np.array(out.point_b))
 
@@ -288,8 +303,7 @@ class Collider:
         True
         """
         a_in_b, b_in_a = c.ebpo_value_bounds(), c.ebpo_value_bounds()
-        with self._options((pose_a, pose_b)) as options:
-            call("ebpo_collide_depth", self._handle, options, tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
+        self._call("ebpo_collide_depth", (pose_a, pose_b), tolerance, ctypes.byref(a_in_b), ctypes.byref(b_in_a))
         return (a_in_b.lo, a_in_b.hi), (b_in_a.lo, b_in_a.hi)
 
     def separation(self, direction: ArrayLike, pose_a: Pose | None = None,
@@ -300,6 +314,5 @@ class Collider:
         0.75
         """
         along, out = doubles(direction, "direction").reshape(3), c.ebpo_separation()
-        with self._options((pose_a, pose_b)) as options:
-            call("ebpo_collide_separation", self._handle, options, along.ctypes.data, ctypes.byref(out))
+        self._call("ebpo_collide_separation", (pose_a, pose_b), along.ctypes.data, ctypes.byref(out))
         return Separation(out.t.lo, out.t.hi, number(out.pair.face_a), number(out.pair.face_b))

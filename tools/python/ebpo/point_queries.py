@@ -1,9 +1,8 @@
 """Queries of points and boxes of a model."""
 from __future__ import annotations
 
-import contextlib
 import ctypes
-from typing import Any, Callable, Iterator
+from typing import Any, Callable
 
 import numpy as np
 
@@ -30,36 +29,33 @@ class PointQueries(RayQueries):
                put: Callable[[np.ndarray, int, int], None], threads: int | None, progress: Progress | None,
                stage: str) -> None:
         """Let the library function `function` process the rows; put(results, begin, end) stores the results."""
-        entry = function
-
-        @contextlib.contextmanager
-        def worker() -> Iterator[Callable[[int, int], None]]:
+        def worker() -> Callable[[int, int], None]:
             results = np.empty(0, dtype)
 
             def work(begin: int, end: int) -> None:
                 nonlocal results
                 if len(results) < end - begin:
                     results = np.empty(end - begin, dtype)
-                points = rows[begin:end]
-                at = 0
+                points, at = rows[begin:end], 0
+                given, out = points.ctypes.data, results.ctypes.data
                 while at < end - begin:
                     count = min(end - begin - at, self._automatic.piece())
                     try:
                         with self._context(count, rows.count, stage) as context:
-                            call(entry, context, points[at:].ctypes.data, count, ctypes.byref(options),
-                                 results[at:].ctypes.data)
+                            call(function, context, given + at * points.strides[0], count, ctypes.byref(options),
+                                 out + at * dtype.itemsize)
                     except ArgumentError:
                         rows.check(begin, end)
                         raise
                     at += count
                 put(results[:end - begin], begin, end)
 
-            yield work
+            return work
 
         share(rows.count, threads or self._threads, worker, progress, stage)
         if rows.count == 0:  # raises the errors of a query, such as NotSolidError
             with self._context() as context:
-                call(entry, context, None, 0, ctypes.byref(options), None)
+                call(function, context, None, 0, ctypes.byref(options), None)
 
     def locate(self, points: ArrayLike, *, level: int | None = None, deadline: float | None = None,
                nan: NanPolicy = "raise", threads: int | None = None, progress: Progress | None = None) -> Located:

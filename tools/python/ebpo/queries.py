@@ -15,6 +15,7 @@ from .signatures import Bar, NanPolicy, Progress
 # Rows of a block. Results of a block stay in the core's cache until they are stored. A block is
 # long enough to make the cost of Python's global lock, which is taken after each block, negligible.
 BLOCK = 1 << 15
+SMALLEST = 64  # rows of the smallest block that is worth a thread
 thread_count = integer_as(ctypes.c_uint)
 
 
@@ -126,47 +127,51 @@ class StageProgress:
 
 def block_of(count: int, threads: int) -> int:
     """Return the block size: a few blocks for each thread, none larger than BLOCK."""
-    return max(64, min(BLOCK, -(-count // (8 * threads))))
+    return max(SMALLEST, min(BLOCK, -(-count // (8 * threads))))
 
 
 def share(count: int, threads: int | None, worker: Callable[[], Any], progress: Progress | None = None,
           stage: str = "queries") -> None:
     """Process rows 0 to count - 1 block by block.
 
-    worker() returns a context manager that gives a function work(begin, end). Each thread has its own
-    worker; the calling thread is one of the threads. When several blocks fail, the exception of the first
-    failed block is raised.
+    worker() returns a function work(begin, end). Each thread has its own function; the calling thread is one of
+    the threads. When several blocks fail, the exception of the first failed block is raised.
     """
-    threads = thread_count(threads or cores(), "threads")
+    threads = thread_count(threads or (cores() if count > SMALLEST else 1), "threads")
     size = block_of(count, threads)
+    report_total = StageProgress(progress, stage, count)
+    if count <= size:
+        if count:
+            report_total(0)
+            worker()(0, count)
+            report_total(count)
+        return
     blocks = -(-count // size)
     numbers: Iterator[int] = itertools.count()
     lock, finished = threading.Lock(), [0]
     failed: dict[int, Any] = {}
-    report_total = StageProgress(progress, stage, count)
 
     def run(report: Callable[[int], None] | None) -> None:
         number = -1
         try:
-            with worker() as work:
-                while not failed:
-                    with lock:
-                        number = next(numbers)
-                    if number >= blocks:
-                        return
-                    begin = number * size
-                    end = min(count, begin + size)
-                    work(begin, end)
-                    with lock:
-                        finished[0] += end - begin
-                    if report:
-                        report(finished[0])
+            work = worker()
+            while not failed:
+                with lock:
+                    number = next(numbers)
+                if number >= blocks:
+                    return
+                begin = number * size
+                end = min(count, begin + size)
+                work(begin, end)
+                with lock:
+                    finished[0] += end - begin
+                if report:
+                    report(finished[0])
         except BaseException as error:
             failed[number] = error
 
     others = [threading.Thread(target=run, args=(None,), daemon=True) for _ in range(min(threads, blocks) - 1)]
-    if count:
-        report_total(0)
+    report_total(0)
     for thread in others:
         thread.start()
     run(report_total if progress else None)
@@ -178,8 +183,7 @@ def share(count: int, threads: int | None, worker: Callable[[], Any], progress: 
         raise
     if failed:
         raise failed[min(failed)]
-    if count:
-        report_total(count)
+    report_total(count)
 
 
 def reporter(progress: Progress | None) -> Callable[[str, int, int], object] | None:

@@ -24,7 +24,7 @@ HIT = np.dtype(c.ebpo_ray_hit)
 SIDES = {"both": c.EBPO_RAY_BOTH, "front": c.EBPO_RAY_FRONT, "back": c.EBPO_RAY_BACK}
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass
 class Rays:
     """Rays of a call. shape: that of the results. valid: the rays without NaN; None: all."""
 
@@ -94,16 +94,18 @@ class RayQueries:
             end = min(rays.count, begin + RAYS, begin + self._automatic.piece())
             report(begin)
             given = rays.block(begin, end)
-            if not np.isfinite(given[:, :6]).all():
-                bad = begin + int((~np.isfinite(given[:, :6]).all(axis=1)).argmax())
-                bad = bad if rays.valid is None else int(np.flatnonzero(rays.valid)[bad])
-                raise ArgumentError(f"ray {bad} has a coordinate that is not a finite number", "EBPO_E_ARGUMENT")
             out = outputs(begin, end)
             try:
                 with self._context(end - begin, rays.count, "rays") as context:
                     call(function, context, given.ctypes.data, end - begin, ctypes.byref(options), *out)
                     keep(begin, end, *out)  # the context owns the lists of hits
             except ArgumentError as error:
+                finite = np.isfinite(given[:, :6]).all(axis=1)
+                if not finite.all():
+                    bad = begin + int(finite.argmin())
+                    bad = bad if rays.valid is None else int(np.flatnonzero(rays.valid)[bad])
+                    raise ArgumentError(f"ray {bad} has a coordinate that is not a finite number",
+                                        "EBPO_E_ARGUMENT") from None
                 if begin:
                     error.args = (f"of rays from {begin} on: {error}",)
                 raise
