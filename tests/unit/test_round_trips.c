@@ -105,6 +105,32 @@ START_TEST(test_remote_leaf_round_trips)
 }
 END_TEST
 
+/* The list of a leaf that is in no subtree is read before the leaf, so that the faces that earlier
+ * leaves list are requested together with their source indices and vertices. */
+START_TEST(test_remote_shared_leaf_round_trips)
+{
+    enum { WAVES = 2 }; /* 4 without the list */
+    static const double scale[3][3] = { { 24, 0, 0 }, { 0, 24, 0 }, { 0, 0, 24 } },
+                        offset[3] = { -6, -6, -6 }, p[3] = { 17, -5.9, -5.9 };
+    two_layouts l;
+    counted_source c;
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 200, 120), large = ebpo_test_tetrahedron(1);
+    ebpo_test_transform(&large, scale, offset);
+    ebpo_test_append(&mesh, &large);
+    ebpo_mesh_free(&large);
+    two_layouts_build(&l, mesh, 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (int n = 0; n < 2; n++) {
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        result a = run_query(far, &c, p, n, ebpo_file_info(far)->subtree_level),
+               b = run_query(l.without, NULL, p, n, -1);
+        counted_close(&c, far);
+        ck_assert_msg(a.waves <= WAVES, "%d: %d waves", n, (int)a.waves);
+        ck_assert(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
 /* --- one large model, which the tests below share --- */
 
 static two_layouts l;
@@ -417,6 +443,7 @@ TEST_SUITE(round_trips)
     tcase_add_checked_fixture(small, scratch_enter, scratch_leave);
     tcase_add_test(small, test_remote_query_round_trips);
     tcase_add_test(small, test_remote_leaf_round_trips);
+    tcase_add_test(small, test_remote_shared_leaf_round_trips);
     suite_add_tcase(suite, small);
     tcase_set_timeout(large, 900);
     tcase_add_unchecked_fixture(large, make_large, free_large);
