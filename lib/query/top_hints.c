@@ -82,30 +82,22 @@ static ebpo_run run_of(const ebpo_node *leaf)
     return run;
 }
 
-/* Adds to `hints` the chunks of a lone leaf, except those of shared faces. */
+/* Adds to `hints` the faces of a lone leaf, and vertices that these faces probably use. Reads the
+ * leaf's list of faces. */
 static void hint_lone_leaf(const ebpo_top *top, ebpo_chunks *chunks, const lone_leaf *leaf,
                            uint32_t needs, ebpo_hints *hints)
 {
     const ebpo_node *root = &top->below[leaf->below];
     ebpo_run run = run_of(root);
-    ebpo_runs_hint(chunks, hints, root->cell.level, &run, 1, needs);
-    ebpo_subtrees_hint_before(chunks, hints, leaf->after, needs);
-}
-
-/* Adds to `hints` the shared faces of a lone leaf, and vertices that they probably use. Reads the
- * leaf's list of faces. */
-static void hint_shared_faces(ebpo_chunks *chunks, const ebpo_node *leaf, uint32_t needs,
-                              ebpo_hints *hints)
-{
     ebpo_level lists = { .group_count = 0 };
-    ebpo_run run = run_of(leaf);
-    if (ebpo_runs_read(chunks, leaf->cell.level, &run, 1, EBPO_NEEDS_MESH, NULL, &lists, NULL) ==
+    ebpo_subtrees_hint_before(chunks, hints, leaf->after, needs);
+    if (ebpo_runs_read(chunks, root->cell.level, &run, 1, EBPO_NEEDS_MESH, NULL, &lists, NULL) ==
         EBPO_OK) {
-        ebpo_faces_hint(chunks, hints, lists.leaf_refs, lists.ref_count, 0);
+        const uint32_t *shared = lists.leaf_refs;
+        ebpo_faces_hint(chunks, hints, shared, lists.ref_count, 0);
         for (uint64_t i = 0; i < lists.ref_count && needs & EBPO_NEEDS_MAPS; i++)
-            if (i == 0 ||
-                lists.leaf_refs[i] / EBPO_FACE_BLOCK != lists.leaf_refs[i - 1] / EBPO_FACE_BLOCK)
-                ebpo_chunks_hint(chunks, hints, EBPO_A_FACE_SOURCE, 0, lists.leaf_refs[i], 1);
+            if (i == 0 || shared[i] / EBPO_FACE_BLOCK != shared[i - 1] / EBPO_FACE_BLOCK)
+                ebpo_chunks_hint(chunks, hints, EBPO_A_FACE_SOURCE, 0, shared[i], 1);
     }
     ebpo_level_free(&lists);
 }
@@ -151,13 +143,15 @@ void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *bel
     for (uint64_t i = 0; i < leaves; i++) /* the rows from which faces and vertices follow */
         rows[found + i] = leaf[i].after < last ? leaf[i].after : last;
     ebpo_subtree_table_hint(chunks, rows, found + leaves);
+    for (uint64_t i = 0; i < leaves; i++) {
+        ebpo_run run = run_of(&top->below[leaf[i].below]);
+        ebpo_runs_hint(chunks, &hints, top->below[leaf[i].below].cell.level, &run, 1, needs);
+    }
+    ebpo_hint_all(&hints); /* in most files, the levels of lone leaves are already here */
     for (uint64_t i = 0; i < found; i++)
         ebpo_subtrees_hint(chunks, &hints, rows[i], 1, needs, EBPO_LEVELS_MAX, true);
     for (uint64_t i = 0; i < leaves; i++)
         hint_lone_leaf(top, chunks, &leaf[i], needs, &hints);
-    ebpo_hint_all(&hints);
-    for (uint64_t i = 0; i < leaves; i++)
-        hint_shared_faces(chunks, &top->below[leaf[i].below], needs, &hints);
     ebpo_hint_all(&hints);
     free(rows);
     free(leaf);
