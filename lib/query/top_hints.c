@@ -98,10 +98,10 @@ static bool hint_lone_leaf(const ebpo_top *top, ebpo_chunks *chunks, const lone_
     ebpo_subtrees_hint_before(chunks, hints, leaf->after, needs);
     ebpo_status status =
         ebpo_runs_read(chunks, root->cell.level, &run, 1, EBPO_NEEDS_MESH, &space, &lists, NULL);
-    if (status == EBPO_OK) {
+    if (status == EBPO_OK && lists.ref_count) {
         const uint32_t *shared = lists.leaf_refs;
         ebpo_faces_hint(chunks, hints, shared, lists.ref_count, 0);
-        for (uint64_t i = 0; i < lists.ref_count && needs & EBPO_NEEDS_MAPS; i++)
+        for (uint64_t i = 0; needs & EBPO_NEEDS_MAPS && i < lists.ref_count; i++)
             if (i == 0 || shared[i] / EBPO_FACE_BLOCK != shared[i - 1] / EBPO_FACE_BLOCK)
                 ebpo_chunks_hint(chunks, hints, EBPO_A_FACE_SOURCE, 0, shared[i], 1);
     }
