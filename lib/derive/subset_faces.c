@@ -196,7 +196,9 @@ static ebpo_status copy_faces(ebpo_cutting *c, const numbering *n)
 {
     ebpo_tree *out = c->out;
     out->info.face_count = out->mesh.face_count = n->count;
-    ebpo_faces_hint(c->chunks, n->old_index, n->count, c->parts);
+    ebpo_hints hints = EBPO_HINTS_INIT(c->chunks->file);
+    ebpo_faces_hint(c->chunks, &hints, n->old_index, n->count, c->parts);
+    ebpo_hint_all(&hints);
     out->mesh.faces = ebpo_alloc(n->count, 3 * sizeof *out->mesh.faces);
     ebpo_status status = out->mesh.faces
                              ? ebpo_pick_rows(c->chunks, EBPO_A_FACES, n->old_index, n->count,

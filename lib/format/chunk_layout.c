@@ -44,10 +44,9 @@ enum {
     CHUNK_LEAST = 256,   /* minimum size of a chunk of a level, in bytes */
     CHUNK_MAX = 32768,   /* maximum size of a chunk of a level, in bytes */
     /* rows of a chunk of other arrays */
-    MAP_ROWS = 2048,        /* /maps/vertex_source */
-    FACES_INDEX_ROWS = 512, /* /mesh/faces_index */
-    SHARED_ROWS = 4096,     /* /subtrees/shared_chunks */
-    ATTRIBUTE_ROWS = 2048   /* arrays of /attributes */
+    MAP_ROWS = 2048,      /* /maps/vertex_source */
+    SHARED_ROWS = 4096,   /* /subtrees/shared_chunks */
+    ATTRIBUTE_ROWS = 2048 /* arrays of /attributes */
 };
 
 /* Returns the last level that is stored whole in a file with subtrees. */
@@ -93,7 +92,6 @@ static uint64_t wanted_rows(const ebpo_info *info, ebpo_array_id id, int level, 
     case EBPO_A_FACES: return EBPO_FACE_BLOCK;
     case EBPO_A_VERTICES: return EBPO_VERTEX_BLOCK;
     case EBPO_A_VERTEX_SOURCE: return MAP_ROWS;
-    case EBPO_A_FACES_INDEX: return FACES_INDEX_ROWS;
     case EBPO_A_SUBTREE_COUNTS: return ebpo_subtree_rows(info);
     case EBPO_A_SUBTREE_SHARED: return SHARED_ROWS;
     case EBPO_A_ATTRIBUTE: return ATTRIBUTE_ROWS;
@@ -246,7 +244,7 @@ static void shared_blocks_take(shared_blocks *b, const owned_range *own, uint32_
 }
 
 enum {
-    DEFAULT_FACES = 1024, /* default number of faces in a subtree */
+    DEFAULT_FACES = 512, /* default number of faces in a subtree */
     LEAST_FACES =
         131072, /* a file has subtrees by default if its mesh has at least this number of faces */
     /* pages of the workspace are released after this number of subtrees; the rows of one subtree in

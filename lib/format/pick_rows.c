@@ -418,11 +418,11 @@ static void hint_vertices(ebpo_chunks *chunks, ebpo_hints *e, uint64_t row, uint
         ebpo_chunks_hint(chunks, e, EBPO_A_VERTEX_SOURCE, 0, row, rows);
 }
 
-void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts)
+void ebpo_faces_hint(ebpo_chunks *chunks, ebpo_hints *hints, const uint32_t *faces, uint64_t count,
+                     uint32_t parts)
 {
     const ebpo_array_in *array = ebpo_reader_array(chunks->file, EBPO_A_FACES, 0);
     uint64_t number = ebpo_shape_chunks(&array->shape), rows = array->shape.chunk_rows;
-    ebpo_hints e = EBPO_HINTS_INIT(chunks->file);
     bool *requested =
         ebpo_input_prefetches(&chunks->file->in) ? chunks_of(array, faces, count) : NULL;
     for (uint64_t i = 0; requested && i < number; i++) {
@@ -431,13 +431,12 @@ void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count,
                                                                  : chunks->file->info.vertex_count;
         if (!requested[i])
             continue;
-        ebpo_chunks_hint(chunks, &e, EBPO_A_FACES, 0, i * rows, rows);
+        ebpo_chunks_hint(chunks, hints, EBPO_A_FACES, 0, i * rows, rows);
         if (parts & EBPO_PART_MAPS)
-            ebpo_chunks_hint(chunks, &e, EBPO_A_FACE_SOURCE, 0, i * rows, rows);
+            ebpo_chunks_hint(chunks, hints, EBPO_A_FACE_SOURCE, 0, i * rows, rows);
         if (first < end)
-            hint_vertices(chunks, &e, first, end - first, parts);
+            hint_vertices(chunks, hints, first, end - first, parts);
     }
-    ebpo_hint_all(&e);
     free(requested);
 }
 

@@ -51,10 +51,11 @@ EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attribu
                                                const char *element, const uint32_t *rows,
                                                uint64_t count, unsigned threads, ebpo_error *error);
 
-/* Sends prefetch hints for reading these faces of the mesh and, if `parts` has EBPO_PART_MAPS,
- * their source indices. Also sends hints for the vertices that the chunks of these faces use first,
- * because most vertices of the faces are among them. */
-void ebpo_faces_hint(ebpo_chunks *chunks, const uint32_t *faces, uint64_t count, uint32_t parts);
+/* For remote files: adds to the hints the chunks of these faces of the mesh, and of the vertices
+ * that these chunks use first, because most vertices of the faces are among them. If `parts` has
+ * EBPO_PART_MAPS, also adds the source indices of faces and vertices. */
+void ebpo_faces_hint(ebpo_chunks *chunks, ebpo_hints *hints, const uint32_t *faces, uint64_t count,
+                     uint32_t parts);
 /* Sends prefetch hints for reading these vertices of the mesh and, if `parts` has EBPO_PART_MAPS,
  * their source indices. */
 void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,

@@ -287,7 +287,9 @@ static ebpo_status pick_mesh(ebpo_lod_model *out, ebpo_chunks *chunks, unsigned 
     ebpo_mesh *mesh = &out->mesh;
     uint64_t corners = 3 * mesh->face_count;
     bool doubles = out->info->double_coordinates;
-    ebpo_faces_hint(chunks, out->picked, mesh->face_count, 0);
+    ebpo_hints hints = EBPO_HINTS_INIT(chunks->file);
+    ebpo_faces_hint(chunks, &hints, out->picked, mesh->face_count, 0);
+    ebpo_hint_all(&hints);
     mesh->faces = ebpo_alloc(corners, sizeof *mesh->faces);
     uint32_t *vertex = ebpo_alloc(corners, sizeof *vertex);
     ebpo_status status = mesh->faces && vertex

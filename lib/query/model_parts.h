@@ -53,12 +53,9 @@ void ebpo_top_free(ebpo_top *top);
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
-/* Returns true if top->below[below] is a *lone leaf*: a leaf at the level of the roots of the
- * file's subtrees, or above. It is in none of these subtrees, but is loaded like one. */
-bool ebpo_top_has_lone_leaf(const ebpo_top *top, const ebpo_info *info, uint32_t below);
-
-/* For a remote file with a table of subtrees: sends one prefetch hint for `count` subtrees and lone
- * leaves, by their indices in top->below. `needs`: EBPO_NEEDS_... (schema.h). */
+/* For a remote file with a table of subtrees: sends one prefetch hint for `count` subtrees, by
+ * their indices in top->below. A leaf that is in no subtree of the file is loaded like a subtree.
+ * `needs`: EBPO_NEEDS_... (schema.h). */
 void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *below, uint64_t count,
                    uint32_t needs);
 

@@ -604,8 +604,10 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
     uint64_t key = ebpo_context_key(c, below);
+    const ebpo_node *root = &m->top->below[below];
     /* a subtree of the file needs no hint here, because its load sends one */
-    if (ebpo_top_has_lone_leaf(m->top, m->info, below) && !ebpo_cache_has(m->cache, key))
+    bool is_of_file = root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level;
+    if (ebpo_input_prefetches(&m->file->in) && !is_of_file && !ebpo_cache_has(m->cache, key))
         ebpo_top_hint(m->top, m->chunks, &below, 1, ebpo_subtree_needs(c->planes));
     bool hit = true;
     ebpo_status status = ebpo_cache_get(m->cache, key, &item, &hit, error);

@@ -1,7 +1,7 @@
 /* Sends prefetch hints (which bytes will be read soon) for the subtrees of a model and for leaves
  * above them. The file's table of subtrees locates all data of a subtree. For a *lone leaf*, a leaf
  * that is in no subtree of the file, the table locates the faces and vertices that are new in the
- * lone leaves between two subtrees. */
+ * lone leaves between two subtrees, and the leaf's list names its other faces. */
 #include "query/model_parts.h"
 
 #include <stdlib.h>
@@ -31,7 +31,9 @@ static uint64_t table_row(const ebpo_top *top, ebpo_chunks *chunks, uint64_t bel
                                                                                       : UINT64_MAX;
 }
 
-bool ebpo_top_has_lone_leaf(const ebpo_top *top, const ebpo_info *info, uint32_t below)
+/* Returns true if top->below[below] is a lone leaf: a leaf at the level of the roots of the file's
+ * subtrees, or above. */
+static bool has_lone_leaf(const ebpo_top *top, const ebpo_info *info, uint32_t below)
 {
     const ebpo_node *root = &top->below[below];
     return root->type == EBPO_LEAF && root->cell.level <= info->subtree_level;
@@ -57,7 +59,7 @@ static uint64_t subtree_after(const ebpo_top *top, ebpo_chunks *chunks, uint32_t
     for (uint32_t i = 0; i < top->below_count; i++) {
         uint64_t other = first_code(top->below[i].cell);
         if (other > code && other < next && top->below[i].cell.level >= info->subtree_level &&
-            !ebpo_top_has_lone_leaf(top, info, i)) {
+            !has_lone_leaf(top, info, i)) {
             next = other;
             found = i;
         }
@@ -73,17 +75,38 @@ typedef struct lone_leaf {
     uint64_t after; /* subtree_after */
 } lone_leaf;
 
-/* Adds to `hints` the chunks of a lone leaf. Shared faces and their vertices are omitted: only the
- * leaf's list names them. */
-static void hint_lone_leaf(const ebpo_top *top, ebpo_chunks *chunks, const lone_leaf *leaf,
+/* Returns the run that consists of a leaf. */
+static ebpo_run run_of(const ebpo_node *leaf)
+{
+    ebpo_run run = { .groups = 0 };
+    run.rank[EBPO_LEAF] = leaf->rank;
+    run.count[EBPO_LEAF] = 1;
+    return run;
+}
+
+/* Adds to `hints` the faces of a lone leaf, and vertices that these faces probably use. Reads the
+ * leaf's list of faces, unless it is long. Returns false if the source fails: the next list could
+ * again wait for a time-out, and the later read reports the error. */
+static bool hint_lone_leaf(const ebpo_top *top, ebpo_chunks *chunks, const lone_leaf *leaf,
                            uint32_t needs, ebpo_hints *hints)
 {
+    enum { LIST_MAX = 1 << 20 }; /* bytes of a list, which counts toward no budget */
     const ebpo_node *root = &top->below[leaf->below];
-    ebpo_run run = { .groups = 0 };
-    run.rank[EBPO_LEAF] = root->rank;
-    run.count[EBPO_LEAF] = 1;
-    ebpo_runs_hint(chunks, hints, root->cell.level, &run, 1, needs);
+    ebpo_run run = run_of(root);
+    ebpo_level lists = { .group_count = 0 };
+    ebpo_quota space = { .most = LIST_MAX };
     ebpo_subtrees_hint_before(chunks, hints, leaf->after, needs);
+    ebpo_status status =
+        ebpo_runs_read(chunks, root->cell.level, &run, 1, EBPO_NEEDS_MESH, &space, &lists, NULL);
+    if (status == EBPO_OK && lists.ref_count) {
+        const uint32_t *shared = lists.leaf_refs;
+        ebpo_faces_hint(chunks, hints, shared, lists.ref_count, 0);
+        for (uint64_t i = 0; needs & EBPO_NEEDS_MAPS && i < lists.ref_count; i++)
+            if (i == 0 || shared[i] / EBPO_FACE_BLOCK != shared[i - 1] / EBPO_FACE_BLOCK)
+                ebpo_chunks_hint(chunks, hints, EBPO_A_FACE_SOURCE, 0, shared[i], 1);
+    }
+    ebpo_level_free(&lists);
+    return status != EBPO_E_IO;
 }
 
 static int compare_rows(const void *x, const void *y)
@@ -115,7 +138,7 @@ void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *bel
     uint64_t *rows = ebpo_alloc(2 * count, sizeof *rows);
     lone_leaf *leaf = ebpo_alloc(count, sizeof *leaf);
     for (uint64_t i = 0; rows && leaf && i < count; i++) {
-        bool is_lone = ebpo_top_has_lone_leaf(top, info, below[i]);
+        bool is_lone = has_lone_leaf(top, info, below[i]);
         uint64_t row =
             is_lone ? subtree_after(top, chunks, below[i]) : table_row(top, chunks, below[i]);
         if (row != UINT64_MAX && is_lone)
@@ -127,10 +150,15 @@ void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *bel
     for (uint64_t i = 0; i < leaves; i++) /* the rows from which faces and vertices follow */
         rows[found + i] = leaf[i].after < last ? leaf[i].after : last;
     ebpo_subtree_table_hint(chunks, rows, found + leaves);
+    for (uint64_t i = 0; i < leaves; i++) {
+        ebpo_run run = run_of(&top->below[leaf[i].below]);
+        ebpo_runs_hint(chunks, &hints, top->below[leaf[i].below].cell.level, &run, 1, needs);
+    }
+    ebpo_hint_all(&hints); /* in most files, the levels of lone leaves are already here */
     for (uint64_t i = 0; i < found; i++)
         ebpo_subtrees_hint(chunks, &hints, rows[i], 1, needs, EBPO_LEVELS_MAX, true);
-    for (uint64_t i = 0; i < leaves; i++)
-        hint_lone_leaf(top, chunks, &leaf[i], needs, &hints);
+    for (uint64_t i = 0; i < leaves && hint_lone_leaf(top, chunks, &leaf[i], needs, &hints); i++)
+        ;
     ebpo_hint_all(&hints);
     free(rows);
     free(leaf);

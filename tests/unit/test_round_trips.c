@@ -105,6 +105,60 @@ START_TEST(test_remote_leaf_round_trips)
 }
 END_TEST
 
+/* The list of a leaf that is in no subtree is read before the leaf, so that the faces that earlier
+ * leaves list are requested together with their source indices and vertices. */
+START_TEST(test_remote_shared_leaf_round_trips)
+{
+    enum { WAVES = 2 }; /* 4 without the list */
+    static const double scale[3][3] = { { 24, 0, 0 }, { 0, 24, 0 }, { 0, 0, 24 } },
+                        offset[3] = { -6, -6, -6 }, p[3] = { 17, -5.9, -5.9 };
+    two_layouts l;
+    counted_source c;
+    ebpo_mesh mesh = ebpo_test_torus(2, 0.7, 200, 120), large = ebpo_test_tetrahedron(1);
+    ebpo_test_transform(&large, scale, offset);
+    ebpo_test_append(&mesh, &large);
+    ebpo_mesh_free(&large);
+    two_layouts_build(&l, mesh, 8, ALL, EBPO_CODEC_ZSTD, 400);
+    for (int n = 0; n < 2; n++) {
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        result a = run_query(far, &c, p, n, ebpo_file_info(far)->subtree_level),
+               b = run_query(l.without, NULL, p, n, -1);
+        counted_close(&c, far);
+        ck_assert_msg(a.waves <= WAVES, "%d: %d waves", n, (int)a.waves);
+        ck_assert(a.distance == b.distance && a.where == b.where);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
+/* In a file with the default layout, a distance query near the surface requests few bytes, because
+ * subtrees are small. If the cut level is deeper than the subtrees' roots, all data of the subtree
+ * in the file are requested together. */
+START_TEST(test_remote_default_layout)
+{
+    enum {
+        BYTES = 310000, /* 440,000 with subtrees of 1,024 faces or more */
+        WAVES = 3       /* 12 if each array is requested alone */
+    };
+    two_layouts l;
+    counted_source c;
+    two_layouts_build(&l, ebpo_test_torus(2, 0.7, 520, 250), 16, ALL & ~EBPO_PART_LEAF_PLANES,
+                      EBPO_CODEC_ZSTD, 0);
+    for (uint32_t n = 0; n < 3; n++) {
+        double cosine, sine;
+        ebpo_test_circle(n < 2 ? 14 * n + 1 : 5, 30, &cosine, &sine);
+        double p[3] = { 2.701 * cosine, 2.701 * sine, 0.01 };
+        ebpo_file *far = counted_open(&c, l.packed, true);
+        result a =
+            run_query(far, &c, p, n == 2, n == 2 ? ebpo_file_info(far)->subtree_level + 1 : -1);
+        ck_assert_msg(c.requested <= BYTES, "%d bytes", (int)c.requested);
+        ck_assert_msg(a.waves <= WAVES, "%d: %d waves", (int)n, (int)a.waves);
+        counted_close(&c, far);
+    }
+    two_layouts_close(&l);
+}
+END_TEST
+
 /* --- one large model, which the tests below share --- */
 
 static two_layouts l;
@@ -417,6 +471,8 @@ TEST_SUITE(round_trips)
     tcase_add_checked_fixture(small, scratch_enter, scratch_leave);
     tcase_add_test(small, test_remote_query_round_trips);
     tcase_add_test(small, test_remote_leaf_round_trips);
+    tcase_add_test(small, test_remote_default_layout);
+    tcase_add_test(small, test_remote_shared_leaf_round_trips);
     suite_add_tcase(suite, small);
     tcase_set_timeout(large, 900);
     tcase_add_unchecked_fixture(large, make_large, free_large);

@@ -9,6 +9,7 @@
 
 #include "check_main.h"
 #include "format/chunk_directory.h"
+#include "format/chunk_layout.h"
 #include "format/slice.h"
 #include "format/subtree_index.h"
 #include "counted_source.h"
@@ -362,6 +363,32 @@ START_TEST(test_chunk_order_follows_specification)
 }
 END_TEST
 
+/* The default level of subtrees is the deepest level with at least 512 faces for each gray node, in
+ * files of 131,072 faces and more. */
+START_TEST(test_default_level_of_subtrees)
+{
+    ebpo_info info = { .face_count = 131072, .level_count = 6 };
+    for (int level = 0; level < 6; level++)
+        info.level[level].gray_count = UINT64_C(1) << 2 * level;
+    ck_assert_int_eq(ebpo_subtree_level_for(&info, 0), 4);
+    info.level[4].gray_count++;
+    ck_assert_int_eq(ebpo_subtree_level_for(&info, 0), 3);
+    ck_assert_int_eq(ebpo_subtree_level_for(&info, 300), 4);
+    info.face_count--;
+    ck_assert_int_eq(ebpo_subtree_level_for(&info, 0), 0);
+}
+END_TEST
+
+/* The index of the faces is read as a whole, so it has as few chunks as possible. With a single
+ * chunk, it precedes HDF5's chunk indexes, and the first request of most files contains it. */
+START_TEST(test_faces_index_has_long_chunks)
+{
+    ebpo_info info = { .subtree_level = 5 };
+    ck_assert_uint_eq(ebpo_rows_of_chunk(&info, EBPO_A_FACES_INDEX, 0, 8000, 0, 8), 8000);
+    ck_assert_uint_eq(ebpo_rows_of_chunk(&info, EBPO_A_FACES_INDEX, 0, 9000, 0, 8), 8192);
+}
+END_TEST
+
 /* --- refused files --- */
 
 /* The items counted by the last columns are in a separate list. */
@@ -435,6 +462,8 @@ TEST_SUITE(subtree_table)
     tcase_add_loop_test(tests, test_models_same_in_both_layouts, 0, 15);
     tcase_add_loop_test(tests, test_subsets_same_in_both_layouts, 0, 3);
     tcase_add_loop_test(tests, test_chunk_order_follows_specification, 0, 2);
+    tcase_add_test(tests, test_default_level_of_subtrees);
+    tcase_add_test(tests, test_faces_index_has_long_chunks);
     tcase_add_test(tests, test_list_not_matching_table_is_refused);
     tcase_add_test(tests, test_failed_connection_ends_batch);
     suite_add_tcase(suite, tests);

@@ -552,7 +552,7 @@ typedef struct ebpo_write_options {
      * have, on average, at least this number of faces. If there is no such level, it is level 1.
      * The data of a subtree is contiguous, so that one read loads it.
      *
-     * 0 (default): the number is 1,024. With this default, the file has no table of subtrees if no
+     * 0 (default): the number is 512. With this default, the file has no table of subtrees if no
      * level reaches this number, or if the mesh has fewer than 131,072 faces.
      *
      * EBPO_NO_SUBTREES: no table of subtrees is written, as in format 1.0. Files of fewer than
