@@ -422,7 +422,6 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     casting *c = r->user;
     ebpo_ray_found m;
     uint32_t local = ebpo_accel_slot_face(r->s, slot);
-    ebpo_accel_fetch_face(r->s, local);
     ebpo_accel_triangle(r->s, slot, m.triangle);
     if (!casting_intersects(c, facing, &m))
         return;
