@@ -22,7 +22,18 @@ typedef struct ebpo_ray_intersection {
      * triangle has no area */
     int facing;
     double t; /* t of the first common point, correctly rounded */
+    /* the part of the triangle in which the line certainly intersects it, if facing is not 0: a bit
+     * (1 << i) for the corner, or two bits for the ends of the edge; 0: interior, or not known */
+    unsigned part;
 } ebpo_ray_intersection;
+
+/* A corner or an edge in which a ray intersects a triangle that is not in one plane with it. Other
+ * triangles with this corner or edge are intersected at the same t. */
+typedef struct ebpo_ray_shared {
+    unsigned count; /* 1: a corner; 2: an edge; 0: nothing is known */
+    double corner[2][3];
+    double t;
+} ebpo_ray_shared;
 
 /* Exact tests of rays and boxes against triangles. For all finite doubles, the decisions are the
  * same as in arithmetic without rounding. Floating-point filters are tried first, and then exact
@@ -37,6 +48,16 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
  * `facing` has the meaning of the member in ebpo_ray_intersection, and is not 0. */
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,
                        ebpo_ray_intersection *out);
+
+/* Sets *out to the corner or edge in which the ray intersects the triangle (at->part). */
+void ebpo_ray_share(const double triangle[3][3], const ebpo_ray_intersection *at,
+                    ebpo_ray_shared *out);
+
+/* Same as ebpo_ray_triangle, but only for a triangle that has the shared corner or edge (count is
+ * not 0). Returns false, without a result, for other triangles, and if the result is not certain.
+ */
+bool ebpo_ray_shares(const ebpo_segment *ray, const ebpo_ray_shared *shared,
+                     const double triangle[3][3], ebpo_ray_intersection *out);
 
 /* Returns the exact sign of t(a) - t(b), where t is the parameter of the first common point with a
  * triangle. The ray must intersect both triangles, and at_a and at_b must be the results of

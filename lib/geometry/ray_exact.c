@@ -283,6 +283,7 @@ void ebpo_ray_triangle_exact(const ebpo_segment *ray, const double triangle[3][3
     out->side = st.any ? st.side : 0;
     out->facing = st.any ? st.facing : 0;
     out->t = st.any ? round_fraction(st.low) : INFINITY;
+    out->part = 0;
     stretch_clear(&st);
 }
 

@@ -39,7 +39,7 @@ static inline bool certainly_less(double a, double b)
 
 static inline void set_miss(ebpo_ray_intersection *out)
 {
-    *out = (ebpo_ray_intersection){ false, 0, 0, INFINITY };
+    *out = (ebpo_ray_intersection){ .t = INFINITY };
 }
 
 /* --- expansions: t as a fraction, exact without allocation --- */
@@ -283,7 +283,7 @@ static bool intersect_within_plane(const ebpo_segment *ray, const double triangl
         before_end |= end <= 0;
         least = sign > 0 ? fmin(least, t) : least;
     }
-    *out = (ebpo_ray_intersection){ after_begin && before_end, 0, 0, INFINITY };
+    *out = (ebpo_ray_intersection){ .intersects = after_begin && before_end, .t = INFINITY };
     if (out->intersects)
         out->t = before_begin ? 0 : least;
     return true;
@@ -363,7 +363,9 @@ static int compare_by_expansions(const ebpo_segment *ray, const double a[3][3],
 
 static inline int bounded_sign(const ebpo_bounded *b)
 {
-    return b->x.head > b->error ? 1 : b->x.head < -b->error ? -1 : SIDE_OPEN;
+    /* without a branch on the sign, which would often be mispredicted */
+    int sign = (b->x.head > b->error) - (b->x.head < -b->error);
+    return sign ? sign : SIDE_OPEN;
 }
 
 /* t as a fraction, first in double-double arithmetic. Expansions are computed when they are needed.
@@ -452,7 +454,7 @@ static bool intersect_plane(const ebpo_segment *ray, const double triangle[3][3]
         if (from_end == EBPO_SIGN_UNKNOWN || from_end > 0)
             return from_end != EBPO_SIGN_UNKNOWN;
     }
-    *out = (ebpo_ray_intersection){ true, side, -sign, t };
+    *out = (ebpo_ray_intersection){ true, side, -sign, t, 0 };
     return true;
 }
 
@@ -542,6 +544,17 @@ static void close_sides(const double d[3], const corner e[3], int sign[3])
             sign[i] = close_edge_side(d, &e[i], &e[i == 2 ? 0 : i + 1]);
 }
 
+/* Returns ebpo_ray_intersection.part for the exact signs of the three edges: a corner is in two
+ * edges. */
+static unsigned part_of(const int sign[3])
+{
+    static const unsigned ends[3] = { 3, 6, 5 };
+    unsigned part = 7;
+    for (int i = 0; i < 3; i++)
+        part &= sign[i] == 0 ? ends[i] : 7;
+    return part == 7 ? 0 : part;
+}
+
 /* Intersects a ray that passes close to an edge or corner. The known signs must be equal or 0.
  * Returns false if the result is not certain, because numbers are too large or too small. */
 static bool intersect_closely(const ebpo_segment *ray, const double triangle[3][3], int sign[3],
@@ -562,21 +575,28 @@ static bool intersect_closely(const ebpo_segment *ray, const double triangle[3][
     if (left && right)
         set_miss(out);
     else if (begins)
-        *out = (ebpo_ray_intersection){ true, 0, -normal, 0 };
+        *out = (ebpo_ray_intersection){ true, 0, -normal, 0, 0 };
     else if (normal == 0)
         return intersect_within_plane(ray, triangle, out);
-    else
-        return intersect_plane(ray, triangle, normal, inner ? -normal : 0, out);
+    else if (!intersect_plane(ray, triangle, normal, inner ? -normal : 0, out))
+        return false;
+    if (out->intersects && normal != 0)
+        out->part = part_of(sign);
     return true;
 }
 
 /* --- shared corners and edges of two triangles --- */
 
+static inline bool is_same(const double p[3], const double q[3])
+{
+    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
+}
+
 static bool has_corner(const double triangle[3][3], const double p[3])
 {
     bool has = false;
     for (int i = 0; i < 3; i++)
-        has |= triangle[i][0] == p[0] && triangle[i][1] == p[1] && triangle[i][2] == p[2];
+        has |= is_same(triangle[i], p);
     return has;
 }
 
@@ -665,6 +685,60 @@ void ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
     }
     if (!done)
         ebpo_ray_triangle_exact(ray, triangle, out);
+}
+
+void ebpo_ray_share(const double triangle[3][3], const ebpo_ray_intersection *at,
+                    ebpo_ray_shared *out)
+{
+    out->count = 0;
+    for (int i = 0; i < 3; i++)
+        if (at->part >> i & 1)
+            memcpy(out->corner[out->count++], triangle[i], sizeof triangle[i]);
+    out->t = at->t;
+}
+
+/* Returns a bit (1 << i) for each corner of the triangle that is a corner of the shared part; 0 if
+ * the triangle does not have all corners of this part. */
+static unsigned shared_corners(const ebpo_ray_shared *shared, const double triangle[3][3])
+{
+    unsigned corners = 0;
+    for (unsigned n = 0; n < shared->count; n++) {
+        unsigned same = 0;
+        for (int i = 0; i < 3; i++)
+            same |= (unsigned)is_same(triangle[i], shared->corner[n]) << i;
+        if (!same)
+            return 0;
+        corners |= same;
+    }
+    return corners;
+}
+
+bool ebpo_ray_shares(const ebpo_segment *ray, const ebpo_ray_shared *shared,
+                     const double triangle[3][3], ebpo_ray_intersection *out)
+{
+    const double *d = ray->direction;
+    double e[3][3], weight = 1 + fabs(d[0]) + fabs(d[1]) + fabs(d[2]);
+    unsigned part = shared_corners(shared, triangle);
+    int facing = 0;
+    if (!part)
+        return false;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            e[i][k] = triangle[i][k] - ray->origin[k];
+    for (int i = 0; i < 3; i++) {
+        int next = i == 2 ? 0 : i + 1;
+        unsigned ends = 1u << i | 1u << next;
+        /* The line intersects edges that contain the shared part, so the sign of their side is 0.
+         * The other edges have one sign, as the line intersects the triangle. */
+        if (shared->count == 1 ? ends & part : ends == part)
+            continue;
+        int sign = filtered_edge_side(d, weight, e[i], e[next]);
+        if (sign == SIDE_OPEN)
+            return false;
+        facing = -sign;
+    }
+    *out = (ebpo_ray_intersection){ true, 0, facing, shared->t, part };
+    return facing != 0;
 }
 
 void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int facing,

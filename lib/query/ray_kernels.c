@@ -56,12 +56,12 @@ EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
 /* Sets the fields of the search that are used in tests of faces. */
 EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
 {
+    static const int axes[4][3] = { { 1, 2, 0 }, { 2, 0, 1 }, { 0, 1, 2 }, { 0, 1, 2 } };
     const double *d = r->direction;
     double x = fabs(d[0]), y = fabs(d[1]), longer = y > x ? y : x;
-    int z = fabs(d[2]) > longer ? 2 : y > x;
-    r->axis[2] = z;
-    r->axis[0] = z == 2 ? 0 : z + 1;
-    r->axis[1] = z == 0 ? 2 : z - 1;
+    /* A table replaces branches, which would often be mispredicted. */
+    memcpy(r->axis, axes[(y > x) | (fabs(d[2]) > longer) << 1], sizeof r->axis);
+    int z = r->axis[2];
     for (int i = 0; i < 2; i++)
         r->shear[i] = (float)(d[r->axis[i]] * r->inverse_double[z]);
     r->shear[2] = (float)r->inverse_double[z];
@@ -256,6 +256,11 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, const ray_corners 
                           bool wide)
 {
     ray_lanes found;
+    const ebpo_meshlet *m = ebpo_accel_meshlet(r->s, block);
+    /* Without this, the vertices would be fetched only after the head of the record, which has
+     * their number. */
+    for (int i = 1; i < (wide ? 6 : 4); i++)
+        __builtin_prefetch((const char *)m + EBPO_MESHLET_UNIT * i);
     ray_faces(r, block, relative, &found, wide);
     if (!found.alive)
         return;
@@ -270,6 +275,7 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, const ray_corners 
             drop_beyond(r);
         if (r->count == EBPO_RAY_CANDIDATES)
             r->judge(r);
+        ebpo_accel_fetch_face(r->s, m->face + lane); /* for the exact test, after the walk */
         r->waiting[r->count++] =
             (ebpo_ray_candidate){ found.low[lane], block * EBPO_BLOCK + lane, facing };
         if (r->wants == EBPO_WANTS_FIRST && found.sure >> lane & 1 && found.high[lane] < r->bound)

@@ -32,6 +32,8 @@ struct ebpo_ray_found {
     double triangle[3][3];
     uint64_t file_face, source_face;
     ebpo_ray_intersection intersection;
+    /* Hits with the same number are in one corner or edge, so at the same t. 0: any other hit. */
+    unsigned shared;
 };
 
 /* Maximum number of subtrees that a round requests: some megabytes of data. */
@@ -64,6 +66,10 @@ typedef struct casting {
     ray_rounds *rounds;   /* the rounds of rays through a remote file; or NULL */
     bool waits;           /* the ray waits for the next round */
     bool no_memory;
+    /* the last corner or edge in which the ray was found to intersect a face, and the number of
+     * such parts so far: the ray intersects most other faces around it, at the same t */
+    ebpo_ray_shared shared;
+    unsigned shared_count;
     uint64_t count;       /* number of hits that are kept */
     ebpo_ray_found first; /* EBPO_WANTS_FIRST: the first hit so far, if count > 0 */
     /* EBPO_WANTS_ALL: an array of the context or of a group of rays with the hits; its capacity */
@@ -83,6 +89,7 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
     c->sides = sides;
     c->done = c->waits = c->no_memory = false;
     c->rounds = NULL;
+    c->shared.count = c->shared_count = 0;
     c->count = 0;
     c->found = &context->unsorted_hits;
     c->capacity = &context->found_capacity;
@@ -248,15 +255,23 @@ static bool ray_search_begin(ebpo_ray_search *r, const ebpo_accel *s)
 }
 
 /* Returns true if the ray hits m->triangle from a side that counts (casting.sides); sets
- * m->intersection. `facing`: the side, if it is already certain that the line goes through the
- * face's interior; otherwise 0. */
-static bool casting_intersects(const casting *c, int facing, ebpo_ray_found *m)
+ * m->intersection and m->shared. `facing`: the side, if it is already certain that the line goes
+ * through the face's interior; otherwise 0. */
+static bool casting_intersects(casting *c, int facing, ebpo_ray_found *m)
 {
     const double(*triangle)[3] = (const double(*)[3])m->triangle;
+    m->shared = 0;
     if (facing)
         ebpo_ray_interior(&c->ray, triangle, facing, &m->intersection);
-    else
+    else if (c->shared.count && ebpo_ray_shares(&c->ray, &c->shared, triangle, &m->intersection))
+        m->shared = c->shared_count;
+    else {
         ebpo_ray_triangle(&c->ray, triangle, &m->intersection);
+        if (m->intersection.part) {
+            ebpo_ray_share(triangle, &m->intersection, &c->shared);
+            m->shared = ++c->shared_count;
+        }
+    }
     return m->intersection.intersects &&
            (c->sides == EBPO_RAY_BOTH ||
             m->intersection.facing == (c->sides == EBPO_RAY_FRONT ? 1 : -1));
@@ -266,8 +281,10 @@ static bool casting_intersects(const casting *c, int facing, ebpo_ray_found *m)
 static int compare_found(const void *a, const void *b, void *ray)
 {
     const ebpo_ray_found *x = a, *y = b;
-    int sign = ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->intersection,
-                                (const double(*)[3])y->triangle, &y->intersection);
+    int sign = x->shared && x->shared == y->shared
+                   ? 0
+                   : ebpo_ray_compare(ray, (const double(*)[3])x->triangle, &x->intersection,
+                                      (const double(*)[3])y->triangle, &y->intersection);
     return sign ? sign : (x->file_face > y->file_face) - (x->file_face < y->file_face);
 }
 
@@ -405,7 +422,6 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     casting *c = r->user;
     ebpo_ray_found m;
     uint32_t local = ebpo_accel_slot_face(r->s, slot);
-    ebpo_accel_fetch_face(r->s, local);
     ebpo_accel_triangle(r->s, slot, m.triangle);
     if (!casting_intersects(c, facing, &m))
         return;

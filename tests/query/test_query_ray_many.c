@@ -30,12 +30,56 @@ EBPO_EIGHT f8 decode_sides(const uint8_t *x)
         count_descent(x);
     return f8_from_bytes(x);
 }
-#define f8_from_bytes      decode_sides
-#define EBPO_KERNEL_SUFFIX counted
+/* The kernels also note the last addresses that are prefetched, and count the blocks that are read,
+ * the blocks whose lines after the first were not prefetched, and the fetches for exact tests. */
+static const void *prefetched[64];
+static uint64_t prefetches, blocks_read, blocks_late, faces_fetched;
+static void note_prefetch(const void *at)
+{
+    prefetched[prefetches++ % (sizeof prefetched / sizeof *prefetched)] = at;
+}
+static bool was_prefetched(const void *at)
+{
+    bool was = false;
+    for (size_t i = 0; i < sizeof prefetched / sizeof *prefetched; i++)
+        was |= prefetched[i] == at;
+    return was;
+}
+static ebpo_face_block open_block(const ebpo_accel *s, uint32_t block)
+{
+    const char *record = (const char *)ebpo_accel_meshlet(s, block);
+    blocks_read++;
+    blocks_late += !was_prefetched(record + 64) || !was_prefetched(record + 128);
+    return ebpo_face_block_open(s, block);
+}
+static void fetch_face(const ebpo_accel *s, uint32_t local)
+{
+    faces_fetched++;
+    ebpo_accel_fetch_face(s, local);
+}
+#define __builtin_prefetch    note_prefetch
+#define ebpo_face_block_open  open_block
+#define ebpo_accel_fetch_face fetch_face
+#define f8_from_bytes         decode_sides
+#define EBPO_KERNEL_SUFFIX    counted
 #include "query/ray_kernels.c"
+#undef __builtin_prefetch
+#undef ebpo_face_block_open
+#undef ebpo_accel_fetch_face
 
-/* Counts the exact comparisons of hits; the linker passes calls to __wrap_. */
-static uint64_t compared;
+/* Counts the exact comparisons of hits, and the intersections of faces without knowledge from other
+ * faces; the linker passes calls to __wrap_. */
+static uint64_t compared, intersected;
+void __real_ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
+                              ebpo_ray_intersection *out);
+void __wrap_ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
+                              ebpo_ray_intersection *out);
+void __wrap_ebpo_ray_triangle(const ebpo_segment *ray, const double triangle[3][3],
+                              ebpo_ray_intersection *out)
+{
+    intersected++;
+    __real_ebpo_ray_triangle(ray, triangle, out);
+}
 int __real_ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
                             const ebpo_ray_intersection *at_a, const double b[3][3],
                             const ebpo_ray_intersection *at_b);
@@ -378,6 +422,33 @@ START_TEST(test_many_hits_during_turns)
 }
 END_TEST
 
+/* The memory that a ray reads next is prefetched: a block's record, which may have several cache
+ * lines, and what the exact test of a face reads. */
+START_TEST(test_memory_is_prefetched)
+{
+    enum { RAYS = 640 };
+    query_model m;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    ebpo_ray *rays = make_rays(&m, RAYS, 6);
+    uint64_t hits = 0;
+    blocks_read = blocks_late = faces_fetched = 0;
+    for (int i = 0; i < RAYS; i++) {
+        ebpo_ray_hit first;
+        bool hit;
+        ASSERT_OK(ebpo_ray_first(m.context, rays[i].origin, rays[i].direction, rays[i].t_max,
+                                 &first, &hit, error));
+        hits += hit;
+    }
+    ck_assert_uint_gt(hits, 100);
+    ck_assert_uint_ge(blocks_read, hits);
+    ck_assert_uint_eq(blocks_late, 0);
+    ck_assert_uint_ge(faces_fetched, hits);
+    free(rays);
+    query_model_free(&m);
+}
+END_TEST
+
 /* A ray through a vertex hits all faces around it at the same t. */
 START_TEST(test_hits_at_vertex_need_few_exact_comparisons)
 {
@@ -386,7 +457,7 @@ START_TEST(test_hits_at_vertex_need_few_exact_comparisons)
     const double down[3] = { 0, 0, -1 };
     const ebpo_ray_hit *found;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
-    compared = 0;
+    compared = intersected = 0;
     for (uint64_t i = 0; i < m.mesh.vertex_count; i++) {
         double from[3];
         ebpo_test_point(&m.mesh, (uint32_t)i, from);
@@ -395,8 +466,9 @@ START_TEST(test_hits_at_vertex_need_few_exact_comparisons)
         hits += count;
     }
     ck_assert_uint_gt(hits, 8 * m.mesh.vertex_count);
-    ck_assert_msg(compared < 2 * hits, "%llu comparisons of %llu hits",
-                  (unsigned long long)compared, (unsigned long long)hits);
+    ck_assert_msg(2 * compared < hits && 2 * intersected < hits,
+                  "%llu comparisons, %llu intersections, %llu hits", (unsigned long long)compared,
+                  (unsigned long long)intersected, (unsigned long long)hits);
     query_model_free(&m);
 }
 END_TEST
@@ -512,6 +584,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
     tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
     tcase_add_test(many, test_many_hits_during_turns);
+    tcase_add_test(many, test_memory_is_prefetched);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);

@@ -489,11 +489,28 @@ START_TEST(test_ray_triangle_difficult_coordinates)
 }
 END_TEST
 
+/* Checks that a corner or edge in which the ray intersects one triangle gives the same result for
+ * another triangle as the separate test. Returns true if it gives a result. */
+static bool check_shared(const ebpo_segment *ray, const double a[3][3],
+                         const ebpo_ray_intersection *at_a, const double b[3][3],
+                         const ebpo_ray_intersection *at_b)
+{
+    ebpo_ray_shared shared;
+    ebpo_ray_intersection m;
+    ebpo_ray_share(a, at_a, &shared);
+    if (shared.count == 0 || !ebpo_ray_shares(ray, &shared, b, &m))
+        return false;
+    ck_assert(at_b->intersects && m.intersects && m.side == 0 && at_b->side == 0);
+    ck_assert_int_eq(m.facing, at_b->facing);
+    ck_assert(memcmp(&m.t, &at_b->t, sizeof m.t) == 0);
+    return true;
+}
+
 /* Fans around a common corner or edge give equal t; others differ slightly. */
 START_TEST(test_ray_hits_are_ordered_exactly)
 {
     uint64_t state = 5;
-    long ties = 0, other = 0;
+    long ties = 0, other = 0, shared = 0;
     const int rounds = scaled_rounds(60000);
     for (int i = 0; i < rounds; i++) {
         ebpo_segment ray;
@@ -513,15 +530,16 @@ START_TEST(test_ray_hits_are_ordered_exactly)
         if (reference_random(&state) % 8 == 0) /* the same corners, some of them twice */
             for (int k = 0; k < 3; k++)
                 memcpy(b[k], a[reference_random(&state) % 3], sizeof b[k]);
-        reference_ray(&ray, (const double(*)[3])a, &ra, &facing);
-        reference_ray(&ray, (const double(*)[3])b, &rb, &facing);
+        const double(*first)[3] = (const double(*)[3])a, (*second)[3] = (const double(*)[3])b;
+        ebpo_ray_intersection at_a, at_b;
+        reference_ray(&ray, first, &ra, &facing);
+        reference_ray(&ray, second, &rb, &facing);
+        ebpo_ray_triangle(&ray, first, &at_a);
+        ebpo_ray_triangle(&ray, second, &at_b);
+        shared += check_shared(&ray, first, &at_a, second, &at_b);
         if (ra.any && rb.any) {
             int order = mpq_cmp(ra.low, rb.low);
             order = (order > 0) - (order < 0);
-            const double(*first)[3] = (const double(*)[3])a, (*second)[3] = (const double(*)[3])b;
-            ebpo_ray_intersection at_a, at_b;
-            ebpo_ray_triangle(&ray, first, &at_a);
-            ebpo_ray_triangle(&ray, second, &at_b);
             ck_assert_int_eq(ebpo_ray_compare(&ray, first, &at_a, second, &at_b), order);
             ck_assert_int_eq(ebpo_ray_compare(&ray, second, &at_b, first, &at_a), -order);
             ties += order == 0;
@@ -530,7 +548,8 @@ START_TEST(test_ray_hits_are_ordered_exactly)
         interval_clear(&ra);
         interval_clear(&rb);
     }
-    ck_assert_msg(ties > rounds / 20 && other > rounds / 20, "%ld ties, %ld others", ties, other);
+    ck_assert_msg(ties > rounds / 20 && other > rounds / 20 && shared > rounds / 20,
+                  "%ld ties, %ld others, %ld in a known part", ties, other, shared);
 }
 END_TEST
 
@@ -544,28 +563,29 @@ START_TEST(test_ray_triangle_known_cases)
         const double (*triangle)[3];
         ebpo_ray_intersection expected;
     } cases[] = {
-        { { { .5, .5, 0 }, { 0, 0, 2 }, INFINITY }, t, { true, -1, -1, .5 } },
-        { { { .5, .5, 2 }, { 0, 0, -1 }, INFINITY }, t, { true, 1, 1, 1 } },
-        { { { .5, .5, 2 }, { 0, 0, -1 }, 1 }, t, { true, 1, 1, 1 } },
-        { { { .5, .5, 2 }, { 0, 0, -1 }, 0x1.fffffffffffffp-1 }, t, { false, 0, 0, 0 } },
-        { { { .5, .5, 1 }, { 0, 0, -1 }, 0 }, t, { true, 1, 1, 0 } },
-        { { { .5, .5, 0 }, { 0, 0, -1 }, INFINITY }, t, { false, 0, 0, 0 } },
-        { { { 1, 1, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, -1, 1 } },
-        { { { 0, 0, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, -1, 1 } },
-        { { { -1, 1, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0, 1 } },
-        { { { .5, .5, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0, 0 } },
-        { { { -1, 1, 1.5 }, { 1, 0, 0 }, INFINITY }, t, { false, 0, 0, 0 } },
-        { { { 2, -1, 0 }, { 0, 4, 0 }, INFINITY }, flat, { true, 0, 0, .25 } },
-        { { { 0, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { true, 0, 0, 1 } },
-        { { { 4, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { false, 0, 0, 0 } },
-        { { { 0, 0, 0 }, { 1, 1, 1 }, 1 }, point, { true, 0, 0, 1 } },
-        { { { 0, 0, 0 }, { 1, 1, 2 }, INFINITY }, point, { false, 0, 0, 0 } },
+        { { { .5, .5, 0 }, { 0, 0, 2 }, INFINITY }, t, { true, -1, -1, .5, 0 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, INFINITY }, t, { true, 1, 1, 1, 0 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, 1 }, t, { true, 1, 1, 1, 0 } },
+        { { { .5, .5, 2 }, { 0, 0, -1 }, 0x1.fffffffffffffp-1 }, t, { false, 0, 0, 0, 0 } },
+        { { { .5, .5, 1 }, { 0, 0, -1 }, 0 }, t, { true, 1, 1, 0, 0 } },
+        { { { .5, .5, 0 }, { 0, 0, -1 }, INFINITY }, t, { false, 0, 0, 0, 0 } },
+        { { { 1, 1, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, -1, 1, 6 } },
+        { { { 0, 0, 0 }, { 0, 0, 1 }, INFINITY }, t, { true, 0, -1, 1, 1 } },
+        { { { -1, 1, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0, 1, 0 } },
+        { { { .5, .5, 1 }, { 1, 0, 0 }, INFINITY }, t, { true, 0, 0, 0, 0 } },
+        { { { -1, 1, 1.5 }, { 1, 0, 0 }, INFINITY }, t, { false, 0, 0, 0, 0 } },
+        { { { 2, -1, 0 }, { 0, 4, 0 }, INFINITY }, flat, { true, 0, 0, .25, 0 } },
+        { { { 0, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { true, 0, 0, 1, 0 } },
+        { { { 4, 0, 0 }, { 1, 0, 0 }, INFINITY }, flat, { false, 0, 0, 0, 0 } },
+        { { { 0, 0, 0 }, { 1, 1, 1 }, 1 }, point, { true, 0, 0, 1, 0 } },
+        { { { 0, 0, 0 }, { 1, 1, 2 }, INFINITY }, point, { false, 0, 0, 0, 0 } },
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ebpo_ray_intersection m;
         ebpo_ray_triangle(&cases[i].ray, cases[i].triangle, &m);
         ck_assert_msg(m.intersects == cases[i].expected.intersects &&
-                          m.side == cases[i].expected.side && m.facing == cases[i].expected.facing,
+                          m.side == cases[i].expected.side &&
+                          m.facing == cases[i].expected.facing && m.part == cases[i].expected.part,
                       "case %zu", i);
         ck_assert_msg(!m.intersects || m.t == cases[i].expected.t, "case %zu: t %g", i, m.t);
     }
