@@ -265,8 +265,9 @@ typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
 /* EBPO_RAY_GROUP: maximum number of rays of a group. EBPO_RAY_PACKET: maximum number of similar
- * rays among them that are walked as a packet. */
-enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8 };
+ * rays among them that are walked as a packet. EBPO_RAY_BUNDLE: maximum number of rays that one
+ * call of ebpo_ray_kernels.misses tests. */
+enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8, EBPO_RAY_BUNDLE = 32 };
 /* Rays through one accel. */
 typedef struct ebpo_ray_group {
     const ebpo_accel *s;
@@ -287,6 +288,9 @@ typedef struct ebpo_ray_kernels {
     /* Walks with all rays of a group. Rays with similar origins and directions, one after another,
      * share the visits of nodes; other rays take turns. */
     void (*walk_many)(ebpo_ray_group *group);
+    /* Returns true if all rays certainly miss all faces. Only similar rays that do not come near
+     * faces are certain. `count`: 1 to EBPO_RAY_BUNDLE. */
+    bool (*misses)(const ebpo_accel *s, const ebpo_ray *rays, unsigned count);
 } ebpo_ray_kernels;
 
 EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)

@@ -402,28 +402,146 @@ static ebpo_ray_search *ray_begin(const ebpo_ray_group *g, unsigned i)
     return r;
 }
 
-/* A packet visits the boxes that its *bundle* may intersect. On each axis, the bundle has one
- * origin and one inverse direction for the nearer sides of boxes, and others for the farther sides.
- * They are chosen among those of the packet's rays, so that the bundle enters a box before each of
- * its rays, and leaves it after each: for a positive direction, the nearer sides get the greatest
- * origin and the least inverse, the farther sides the least origin and the greatest inverse. (An
- * inverse that is wrong for a side behind the origin does not matter: the bundle then enters at a
- * negative t, or misses, as all rays do.) The proof for one ray (docs/develop/bounds.md, "A ray
- * against boxes") holds for the bundle, too. It compares the rounding errors with the shift of the
- * origin, at least 8u|o| + E. The shift of the ray whose origin was chosen is as large as this; any
- * other ray's origin is at a distance of at least its own shift from the chosen origin, and if the
- * two origins differ in size, at a greater distance.
+/* Several rays together visit the boxes that their *bundle* may intersect. On each axis, the bundle
+ * has one origin and one inverse direction for the nearer sides of boxes, and others for the
+ * farther sides. They are chosen among those of the rays, so that the bundle enters a box before
+ * each of its rays, and leaves it after each: for a positive direction, the nearer sides get the
+ * greatest origin and the least inverse, the farther sides the least origin and the greatest
+ * inverse. (An inverse that is wrong for a side behind the origin does not matter: the bundle then
+ * enters at a negative t, or misses, as all rays do.) The proof for one ray
+ * (docs/develop/bounds.md, "A ray against boxes") holds for the bundle, too. It compares the
+ * rounding errors with the shift of the origin, at least 8u|o| + E. The shift of the ray whose
+ * origin was chosen is as large as this; any other ray's origin is at a distance of at least its
+ * own shift from the chosen origin, and if the two origins differ in size, at a greater distance.
  *
- * Then each child that the bundle may intersect is tested for each ray. If one ray is left, this
- * ray walks on alone. Arrays of [4] are those of ebpo_ray_search, for the bundle; arrays of eight
- * floats have a ray in each lane. */
+ * The arrays are those of ebpo_ray_search. */
+typedef struct ray_bundle {
+    const uint8_t (*side_at)[3];
+    float near_from[4], far_from[4], near_inverse[4], far_inverse[4], near_step[4], far_step[4];
+    float bound; /* the greatest bound of all rays */
+} ray_bundle;
+
+/* Returns a bit for each child whose box the bundle may intersect (ray_children). */
+EBPO_EIGHT unsigned bundle_children(const ray_bundle *p, const ebpo_bound *b, f8 *enter)
+{
+    f8 origin = f8_load_twice(b->origin), step = f8_load_twice(b->origin + 2),
+       near_step = f8_mul(step, f8_load_twice(p->near_step)),
+       far_step = f8_mul(step, f8_load_twice(p->far_step)),
+       near = f8_mul(f8_sub(origin, f8_load_twice(p->near_from)), f8_load_twice(p->near_inverse)),
+       far = f8_mul(f8_sub(origin, f8_load_twice(p->far_from)), f8_load_twice(p->far_inverse));
+    const uint8_t(*at)[3] = p->side_at;
+    f8 from =
+        f8_max(f8_max(side_at(b, at[0][0], f8_spread1(near_step), f8_spread0(near)),
+                      side_at(b, at[0][1], f8_spread2(near_step), f8_spread1(near))),
+               f8_max(side_at(b, at[0][2], f8_spread3(near_step), f8_spread2(near)), f8_all(0)));
+    f8 to = f8_min(f8_min(side_at(b, at[1][0], f8_spread1(far_step), f8_spread0(far)),
+                          side_at(b, at[1][1], f8_spread2(far_step), f8_spread1(far))),
+                   f8_min(side_at(b, at[1][2], f8_spread3(far_step), f8_spread2(far)),
+                          f8_all(p->bound)));
+    *enter = from;
+    return f8_bits(f8_at_most(from, to)) & ((1u << b->count) - 1);
+}
+
+/* --- bundles that miss all faces --- */
+
+/* Greatest number of nodes that ray_misses visits. */
+enum { MISS_NODES = 12 };
+/* Greatest coordinate of an origin in ray_misses, as a multiple of the accel's largest coordinate.
+ * Origins are not moved, so the bounds of a bundle from far away are wide. */
+static const double miss_reach = 64;
+
+/* Sets the bundle on one axis, from the least and greatest origin and direction in the frame. */
+EBPO_EIGHT void bundle_set_axis(ray_bundle *b, int k, const double origin[2], const double d[2],
+                                double error)
+{
+    bool down = d[0] < 0;
+    double ahead = fmax(fabs(origin[0]), fabs(origin[1])) * 0x1p-21 + error, sign = down ? -1 : 1,
+           nearer = sign / fmax(fabs(d[!down]), 0x1p-72),
+           farther = sign / fmax(fabs(d[down]), 0x1p-72);
+    b->near_from[k] = (float)(down ? origin[0] - ahead : origin[1] + ahead);
+    b->far_from[k] = (float)(down ? origin[1] + ahead : origin[0] - ahead);
+    b->near_inverse[k] = b->near_step[k + 1] = (float)nearer;
+    b->far_inverse[k] = b->far_step[k + 1] = (float)farther;
+}
+
+/* Sets the bundle of rays. Returns false if they have no bundle: a coordinate of their directions
+ * has both signs, the directions need to be scaled, or the origins are far away. */
+EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
+{
+    v4d least[3], most[3], d_least[3], d_most[3]; /* of four rays each */
+    for (int k = 0; k < 3; k++) {
+        least[k] = most[k] = v4d_all(ray->origin[k]);
+        d_least[k] = d_most[k] = v4d_all(ray->direction[k]);
+    }
+    for (unsigned i = 0; i < count; i += 4) {
+        const ebpo_ray *a = ray + i, *last = ray + count - 1, *x = a + 1 < last ? a + 1 : last,
+                       *y = a + 2 < last ? a + 2 : last, *z = a + 3 < last ? a + 3 : last;
+        for (int k = 0; k < 3; k++) {
+            v4d o = { a->origin[k], x->origin[k], y->origin[k], z->origin[k] },
+                d = { a->direction[k], x->direction[k], y->direction[k], z->direction[k] };
+            least[k] = v4d_min(o, least[k]);
+            most[k] = v4d_max(o, most[k]);
+            d_least[k] = v4d_min(d, d_least[k]);
+            d_most[k] = v4d_max(d, d_most[k]);
+        }
+    }
+    double origin[3][2], d[3][2], greatest = 0, longest = 0, sure = 0;
+    unsigned signs = 0;
+    for (int k = 0; k < 3; k++) {
+        origin[k][0] = (-v4d_greatest(-least[k]) - s->centre[k]) * s->scale;
+        origin[k][1] = (v4d_greatest(most[k]) - s->centre[k]) * s->scale;
+        d[k][0] = -v4d_greatest(-d_least[k]);
+        d[k][1] = v4d_greatest(d_most[k]);
+        if (d[k][0] < 0 && d[k][1] > 0)
+            return false;
+        greatest = fmax(greatest, fmax(fabs(origin[k][0]), fabs(origin[k][1])));
+        longest = fmax(longest, fmax(fabs(d[k][0]), fabs(d[k][1])));
+        sure = fmax(sure, fmin(fabs(d[k][0]), fabs(d[k][1])));
+        signs |= (unsigned)(d[k][0] < 0) << k;
+    }
+    if (!(longest <= EBPO_RAY_LONGEST && sure >= EBPO_RAY_SHORTEST && s->scale < INFINITY &&
+          greatest <= miss_reach * s->largest_coordinate))
+        return false;
+    memset(b, 0, sizeof *b);
+    for (int k = 0; k < 3; k++)
+        bundle_set_axis(b, k, origin[k], d[k], ebpo_ray_error(s, greatest));
+    b->side_at = ray_side_at[signs];
+    b->bound = EBPO_RAY_BEYOND;
+    return true;
+}
+
+static bool ray_misses(const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
+{
+    ray_bundle bundle;
+    uint32_t stack[8 * MISS_NODES];
+    unsigned top = 0;
+    if (!bundle_set(&bundle, s, ray, count) || s->root_bound & EBPO_IS_BLOCK)
+        return false;
+    stack[top++] = s->root_bound;
+    for (int visits = 0; top; visits++) {
+        f8 enter;
+        const ebpo_bound *b = &s->bound[stack[--top]];
+        if (visits == MISS_NODES)
+            return false;
+        for (unsigned lanes = bundle_children(&bundle, b, &enter); lanes; lanes &= lanes - 1) {
+            uint32_t child = b->child[__builtin_ctz(lanes)];
+            if (child & EBPO_IS_BLOCK)
+                return false;
+            stack[top++] = child;
+        }
+    }
+    return true;
+}
+
+/* --- packets: eight rays walked together --- */
+
+/* Each child that the bundle may intersect is tested for each ray. If one ray is left, this ray
+ * walks on alone. Arrays of eight floats have a ray in each lane. */
 typedef struct ray_packet {
     ebpo_ray_group *g;
     unsigned first, count;                    /* the group's rays first .. first + count - 1 */
     ebpo_ray_search *search[EBPO_RAY_PACKET]; /* NULL: not begun */
-    const uint8_t (*side_at)[3];
-    float near_from[4], far_from[4], near_inverse[4], far_inverse[4], near_step[4], far_step[4];
-    float bound; /* the greatest bound of all rays */
+    ray_bundle bundle;
     float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
 } ray_packet;
 
@@ -447,10 +565,10 @@ EBPO_EIGHT void packet_set_axis(ray_packet *p, int k, bool down, f8 near, f8 far
     f8_store(p->from_near[k], near);
     f8_store(p->from_far[k], far);
     f8_store(p->inverse[k], inverse);
-    p->near_from[k] = down ? f8_least(near) : greatest_of(near);
-    p->far_from[k] = down ? greatest_of(far) : f8_least(far);
-    p->near_inverse[k] = p->near_step[k + 1] = down ? most : least;
-    p->far_inverse[k] = p->far_step[k + 1] = down ? least : most;
+    p->bundle.near_from[k] = down ? f8_least(near) : greatest_of(near);
+    p->bundle.far_from[k] = down ? greatest_of(far) : f8_least(far);
+    p->bundle.near_inverse[k] = p->bundle.near_step[k + 1] = down ? most : least;
+    p->bundle.far_inverse[k] = p->bundle.far_step[k + 1] = down ? least : most;
 }
 
 /* Returns true if rays are similar enough to walk together: all directions have the same signs,
@@ -478,7 +596,7 @@ EBPO_EIGHT bool packet_is_coherent(const packet_frame *f, const ebpo_accel *s)
 EBPO_EIGHT void packet_set_bounds(ray_packet *p, f8 bounds)
 {
     f8_store(p->bounds, bounds);
-    p->bound = greatest_of(bounds);
+    p->bundle.bound = greatest_of(bounds);
 }
 
 /* Returns the bounds with another bound of ray i. */
@@ -505,31 +623,11 @@ EBPO_EIGHT void packet_set(ray_packet *p, const packet_frame *f)
                         f8_from_doubles(far[0], far[1]), f8_from_doubles(inverse[0], inverse[1]));
         signs |= (unsigned)down << k;
     }
-    p->side_at = ray_side_at[signs];
+    p->bundle.side_at = ray_side_at[signs];
     /* numbers that are read, but not used */
-    p->near_from[3] = p->far_from[3] = p->near_inverse[3] = p->far_inverse[3] = 0;
-    p->near_step[0] = p->far_step[0] = 0;
-}
-
-/* Returns a bit for each child whose box the bundle may intersect (ray_children). */
-EBPO_EIGHT unsigned packet_children(const ray_packet *p, const ebpo_bound *b, f8 *enter)
-{
-    f8 origin = f8_load_twice(b->origin), step = f8_load_twice(b->origin + 2),
-       near_step = f8_mul(step, f8_load_twice(p->near_step)),
-       far_step = f8_mul(step, f8_load_twice(p->far_step)),
-       near = f8_mul(f8_sub(origin, f8_load_twice(p->near_from)), f8_load_twice(p->near_inverse)),
-       far = f8_mul(f8_sub(origin, f8_load_twice(p->far_from)), f8_load_twice(p->far_inverse));
-    const uint8_t(*at)[3] = p->side_at;
-    f8 from =
-        f8_max(f8_max(side_at(b, at[0][0], f8_spread1(near_step), f8_spread0(near)),
-                      side_at(b, at[0][1], f8_spread2(near_step), f8_spread1(near))),
-               f8_max(side_at(b, at[0][2], f8_spread3(near_step), f8_spread2(near)), f8_all(0)));
-    f8 to = f8_min(f8_min(side_at(b, at[1][0], f8_spread1(far_step), f8_spread0(far)),
-                          side_at(b, at[1][1], f8_spread2(far_step), f8_spread1(far))),
-                   f8_min(side_at(b, at[1][2], f8_spread3(far_step), f8_spread2(far)),
-                          f8_all(p->bound)));
-    *enter = from;
-    return f8_bits(f8_at_most(from, to)) & ((1u << b->count) - 1);
+    p->bundle.near_from[3] = p->bundle.far_from[3] = p->bundle.near_inverse[3] =
+        p->bundle.far_inverse[3] = 0;
+    p->bundle.near_step[0] = p->bundle.far_step[0] = 0;
 }
 
 /* Returns a bit for each ray that may intersect the box of this child before the ray's bound. */
@@ -538,8 +636,8 @@ EBPO_EIGHT unsigned packet_rays(const ray_packet *p, const ebpo_bound *b, unsign
     const uint8_t *sides = (const uint8_t *)b + lane;
     f8 from = f8_all(0), to = f8_load(p->bounds);
     for (int k = 0; k < 3; k++) {
-        f8 near = f8_all(b->origin[k] + b->step[k] * (float)sides[p->side_at[0][k]]),
-           far = f8_all(b->origin[k] + b->step[k] * (float)sides[p->side_at[1][k]]),
+        f8 near = f8_all(b->origin[k] + b->step[k] * (float)sides[p->bundle.side_at[0][k]]),
+           far = f8_all(b->origin[k] + b->step[k] * (float)sides[p->bundle.side_at[1][k]]),
            inverse = f8_load(p->inverse[k]);
         from = f8_max(f8_mul(f8_sub(near, f8_load(p->from_near[k])), inverse), from);
         to = f8_min(f8_mul(f8_sub(far, f8_load(p->from_far[k])), inverse), to);
@@ -612,13 +710,13 @@ EBPO_EIGHT uint32_t packet_push(const ebpo_accel *s, ebpo_visit *stack, uint32_t
 EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack, bool wide)
 {
     f8 enter;
-    unsigned lanes = packet_children(p, &s->bound[s->root_bound], &enter);
+    unsigned lanes = bundle_children(&p->bundle, &s->bound[s->root_bound], &enter);
     uint32_t top = packet_push(s, stack, 0, s->root_bound, lanes, enter, wide);
     while (top) {
         ebpo_visit v = stack[--top];
         uint32_t node = (uint32_t)v / 8;
         unsigned lane = (uint32_t)v % 8;
-        if (ebpo_visit_key(v) > p->bound)
+        if (ebpo_visit_key(v) > p->bundle.bound)
             continue;
         unsigned rays = packet_rays(p, &s->bound[node], lane);
         uint32_t child = s->bound[node].child[lane];
@@ -629,7 +727,7 @@ EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stac
         } else if (child & EBPO_IS_BLOCK) {
             packet_block(p, s, child & ~EBPO_IS_BLOCK, rays, wide);
         } else {
-            lanes = packet_children(p, &s->bound[child], &enter);
+            lanes = bundle_children(&p->bundle, &s->bound[child], &enter);
             top = packet_push(s, stack, top, child, lanes, enter, wide);
         }
     }
@@ -800,4 +898,4 @@ static void ray_walk_many(ebpo_ray_group *g)
         ray_walk_in_turns(other, others, g, false, false);
 }
 
-const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };
+const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many, ray_misses };

@@ -647,13 +647,16 @@ static void begin_ray(batch *b, uint64_t i, unsigned worker, casting *c)
                   b->options.sides);
 }
 
+/* The result of a ray without a hit. */
+static const ebpo_ray_hit no_hit = { INFINITY, EBPO_NO_FACE, 0 };
+
 /* Stores the result of ray i. */
 static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *c,
                                 ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (b->wants == EBPO_WANTS_FIRST)
-        b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
+        b->first[i] = c->count ? hit_of(&c->first) : no_hit;
     else if (b->wants == EBPO_WANTS_ANY)
         b->any[i] = c->count;
     else {
@@ -664,6 +667,24 @@ static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *
     }
     if (status == EBPO_OK && b->options.done)
         b->options.done[i] = true;
+    return status;
+}
+
+/* Stores the results of rays without hits. */
+static ebpo_status store_misses(batch *b, uint64_t begin, uint64_t end, unsigned worker,
+                                ebpo_error *error)
+{
+    casting none = { .count = 0 };
+    ebpo_status status = EBPO_OK;
+    if (b->wants == EBPO_WANTS_FIRST && !b->options.done) {
+        for (uint64_t i = begin; i < end; i++)
+            b->first[i] = no_hit;
+        return EBPO_OK;
+    }
+    none.context = b->context[worker];
+    none.found = &none.context->unsorted_hits;
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
+        status = store_result(b, i, worker, &none, error);
     return status;
 }
 
@@ -718,6 +739,7 @@ static void add_to_group(group *g, uint64_t ray)
 static ebpo_status cast_group(group *g, ebpo_error *error)
 {
     const ebpo_accel *s = g->rays.s;
+    bool pruned = g->b->context[g->worker]->model->info->pruned;
     ebpo_status status = EBPO_OK;
     g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
     /* Prefetches what the exact tests of candidates will read. (gcc omits calls of a separate
@@ -727,6 +749,10 @@ static ebpo_status cast_group(group *g, ebpo_error *error)
             ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, g->begun[i]->waiting[k].slot));
     for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
         casting *c = &g->c[i];
+        if (!g->begun[i] && !pruned) {
+            status = store_misses(g->b, g->index[i], g->index[i] + 1, g->worker, error);
+            continue;
+        }
         if (g->begun[i])
             end_search(g->begun[i]);
         else
@@ -734,6 +760,26 @@ static ebpo_status cast_group(group *g, ebpo_error *error)
         status = ray_end(c, EBPO_OK, error);
         if (status == EBPO_OK)
             status = store_result(g->b, g->index[i], g->worker, c, error);
+    }
+    return status;
+}
+
+/* Finds the hits of the rays begin .. end - 1, in groups. */
+static ebpo_status cast_part(group *g, uint64_t begin, uint64_t end, ebpo_error *error)
+{
+    const batch *b = g->b;
+    const ebpo_model *m = b->context[g->worker]->model;
+    ebpo_status status = EBPO_OK;
+    /* In a subset, rays that miss all faces may come through pruned nodes. */
+    if (end - begin > 1 && !b->options.done && !m->info->pruned &&
+        m->kernels.ray->misses(m->whole, b->rays + begin, (unsigned)(end - begin)))
+        return store_misses(g->b, begin, end, g->worker, error);
+    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
+        g->rays.count = 0;
+        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
+            if (!b->options.done || !b->options.done[i])
+                add_to_group(g, i);
+        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
     }
     return status;
 }
@@ -754,13 +800,8 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
     memset(g->found, 0, sizeof g->found);
     memset(g->capacity, 0, sizeof g->capacity);
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
-        g->rays.count = 0;
-        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
-            if (!b->options.done || !b->options.done[i])
-                add_to_group(g, i);
-        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
-    }
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i += EBPO_RAY_BUNDLE)
+        status = cast_part(g, i, end - i < EBPO_RAY_BUNDLE ? end : i + EBPO_RAY_BUNDLE, error);
     for (unsigned i = 0; i < EBPO_RAY_GROUP; i++)
         free(g->found[i]);
     free(g);
@@ -912,6 +953,15 @@ static void put_in_order(batch *b, const ebpo_model *m)
 
 ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error *error)
 {
+    double not_finite = 0; /* 0, or NaN if a sum of coordinates is not finite */
+    bool wrong = false;
+    for (uint64_t i = 0; i < count; i++) {
+        const double *o = rays[i].origin, *d = rays[i].direction;
+        not_finite += (o[0] + o[1] + o[2] + d[0] + d[1] + d[2]) * 0;
+        wrong |= ((d[0] == 0) & (d[1] == 0) & (d[2] == 0)) | !(rays[i].t_max >= 0);
+    }
+    if (not_finite == 0 && !wrong)
+        return EBPO_OK;
     for (uint64_t i = 0; i < count; i++) {
         const char *fault = ray_fault(rays[i].origin, rays[i].direction, rays[i].t_max);
         if (fault)

@@ -256,19 +256,19 @@ static void counted_walk_many(ebpo_ray_group *g)
 
 enum { SIDE = 64 };
 
-/* Returns the number of sides that are decoded for rays from one eye through SIDE * SIDE pixels, in
- * calls of `part` rays. *hit: the number of rays with a hit. */
-static uint64_t count_sides(query_model *m, uint64_t part, uint64_t *hit)
+/* Returns the number of sides that are decoded for rays from one eye through SIDE * SIDE pixels,
+ * `aside` of the picture's middle, in calls of `part` rays. *hit: the number of rays with a hit. */
+static uint64_t count_sides_aside(query_model *m, double aside, uint64_t part, uint64_t *hit)
 {
     static ebpo_ray rays[SIDE * SIDE];
     static ebpo_ray_hit hits[SIDE * SIDE];
     ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
     options.threads = 1;
     for (int i = 0; i < SIDE * SIDE; i++)
-        rays[i] =
-            (ebpo_ray){ { 0.1, 0.2, 5 },
-                        { (i % SIDE - SIDE / 2) * 0x1p-7, (i / SIDE - SIDE / 2) * 0x1p-7, -1 },
-                        INFINITY };
+        rays[i] = (ebpo_ray){ { 0.1, 0.2, 5 },
+                              { (i % SIDE - SIDE / 2) * 0x1p-7 + aside,
+                                (i / SIDE - SIDE / 2) * 0x1p-7, -1 },
+                              INFINITY };
     decoded_sides = 0;
     for (uint64_t i = 0; i < SIDE * SIDE; i += part)
         ASSERT_OK(ebpo_ray_first_many(m->context, rays + i, part, &options, hits + i, error));
@@ -277,6 +277,24 @@ static uint64_t count_sides(query_model *m, uint64_t part, uint64_t *hit)
         *hit += hits[i].face != EBPO_NO_FACE;
     return decoded_sides;
 }
+static uint64_t count_sides(query_model *m, uint64_t part, uint64_t *hit)
+{
+    return count_sides_aside(m, 0, part, hit);
+}
+
+/* A picture of nothing needs one visit of a node for each EBPO_RAY_BUNDLE rays. */
+START_TEST(test_bundles_miss_together)
+{
+    query_model m;
+    uint64_t hits, sides;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    sides = count_sides_aside(&m, 0.8, SIDE * SIDE, &hits);
+    ck_assert_uint_eq(hits, 0);
+    ck_assert_uint_eq(sides, 6 * SIDE * SIDE / EBPO_RAY_BUNDLE);
+    query_model_free(&m);
+}
+END_TEST
 
 START_TEST(test_coherent_rays_share_nodes)
 {
@@ -294,7 +312,8 @@ END_TEST
 /* A search is begun only for a ray of a packet that reaches a block. */
 START_TEST(test_coherent_rays_begin_few_searches)
 {
-    const ebpo_ray_kernels kernels = { ebpo_ray_kernels_counted.walk, counted_walk_many };
+    const ebpo_ray_kernels kernels = { ebpo_ray_kernels_counted.walk, counted_walk_many,
+                                       ebpo_ray_kernels_counted.misses };
     query_model m;
     uint64_t hits;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
@@ -508,6 +527,7 @@ TEST_SUITE(query_ray_many)
     tcase_set_timeout(tight, 600);
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
+    tcase_add_test(many, test_bundles_miss_together);
     tcase_add_test(many, test_coherent_rays_share_nodes);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
     tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
