@@ -268,19 +268,29 @@ typedef struct ebpo_nearest_kernels {
  * rays among them that are walked as a packet. EBPO_RAY_BUNDLE: maximum number of rays that one
  * call of ebpo_ray_kernels.misses tests. */
 enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8, EBPO_RAY_BUNDLE = 32 };
+/* Candidates of a ray of a packet. */
+enum { EBPO_RAY_FEW = 8 };
+typedef struct ebpo_ray_few {
+    unsigned count;
+    ebpo_ray_candidate waiting[EBPO_RAY_FEW];
+} ebpo_ray_few;
 /* Rays through one accel. */
 typedef struct ebpo_ray_group {
     const ebpo_accel *s;
     ebpo_ray_wants wants; /* of all rays */
     unsigned count;       /* at least 1 */
     const ebpo_ray *ray[EBPO_RAY_GROUP];
-    /* Begins the search of ray i. Returns NULL if the ray misses all faces. Rays whose search is
-     * not begun miss all faces. */
+    int facing; /* as in ebpo_ray_search */
+    /* Begins the search of ray i. Returns NULL if the ray misses all faces. */
     ebpo_ray_search *(*begin)(void *user, unsigned i);
     void *user;
+    /* Set by walk_many: the candidates of rays whose search is not begun. The caller must test
+     * them. */
+    ebpo_ray_few few[EBPO_RAY_GROUP];
     /* Space for walk_many. Without the additional visits, the beginnings of all rows would compete
      * for the same lines of the processor's cache. */
     ebpo_visit stack[EBPO_RAY_GROUP][EBPO_VISITS_MAX + 24];
+    float enter[EBPO_VISITS_MAX][EBPO_RAY_PACKET];
 } ebpo_ray_group;
 
 typedef struct ebpo_ray_kernels {

@@ -416,13 +416,19 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     r->limit = c->limit;
 }
 
+/* Returns the value of ebpo_ray_search.facing. */
+static int facing_of(ebpo_ray_sides sides)
+{
+    return sides == EBPO_RAY_BOTH ? 0 : sides == EBPO_RAY_FRONT ? 1 : -1;
+}
+
 /* Prepares the search of the faces of a subtree or of the whole model. Returns false if the ray
  * misses all faces. */
 static bool begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
 {
     r->ray = &c->ray;
     r->wants = c->wants;
-    r->facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
+    r->facing = facing_of(c->sides);
     r->limit = c->limit;
     r->decide = decide_face;
     r->user = c;
@@ -650,14 +656,24 @@ static void begin_ray(batch *b, uint64_t i, unsigned worker, casting *c)
 /* The result of a ray without a hit. */
 static const ebpo_ray_hit no_hit = { INFINITY, EBPO_NO_FACE, 0 };
 
+/* Stores the first hit of ray i. */
+static void store_first(batch *b, uint64_t i, ebpo_ray_hit hit)
+{
+    b->first[i] = hit;
+    if (b->options.done)
+        b->options.done[i] = true;
+}
+
 /* Stores the result of ray i. */
 static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *c,
                                 ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (b->wants == EBPO_WANTS_FIRST)
-        b->first[i] = c->count ? hit_of(&c->first) : no_hit;
-    else if (b->wants == EBPO_WANTS_ANY)
+    if (b->wants == EBPO_WANTS_FIRST) {
+        store_first(b, i, c->count ? hit_of(&c->first) : no_hit);
+        return EBPO_OK;
+    }
+    if (b->wants == EBPO_WANTS_ANY)
         b->any[i] = c->count;
     else {
         found f = { .worker = worker, .begin = b->hit_count[worker] };
@@ -676,11 +692,10 @@ static ebpo_status store_misses(batch *b, uint64_t begin, uint64_t end, unsigned
 {
     casting none = { .count = 0 };
     ebpo_status status = EBPO_OK;
-    if (b->wants == EBPO_WANTS_FIRST && !b->options.done) {
-        for (uint64_t i = begin; i < end; i++)
-            b->first[i] = no_hit;
+    for (uint64_t i = begin; i < end && b->wants == EBPO_WANTS_FIRST; i++)
+        store_first(b, i, no_hit);
+    if (b->wants == EBPO_WANTS_FIRST)
         return EBPO_OK;
-    }
     none.context = b->context[worker];
     none.found = &none.context->unsorted_hits;
     for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
@@ -735,33 +750,103 @@ static void add_to_group(group *g, uint64_t ray)
     g->begun[i] = NULL;
 }
 
+/* Returns the candidates of ray i of a group after walk_many. *count: their number. */
+static const ebpo_ray_candidate *candidates_of(const group *g, unsigned i, unsigned *count)
+{
+    const ebpo_ray_few *few = &g->rays.few[i];
+    *count = g->begun[i] ? (unsigned)g->begun[i]->count : few->count;
+    return g->begun[i] ? g->begun[i]->waiting : few->waiting;
+}
+
+/* Tests the candidates of ray i of a group, and stores the result. */
+static ebpo_status end_ray(group *g, unsigned i, ebpo_error *error)
+{
+    const ebpo_ray_few *few = &g->rays.few[i];
+    casting *c = &g->c[i];
+    ebpo_ray_search *r = g->begun[i];
+    if (!r && few->count && (r = begin_of_group(g, i))) {
+        memcpy(r->waiting, few->waiting, few->count * sizeof *few->waiting);
+        r->count = (int)few->count;
+    }
+    if (r)
+        end_search(r);
+    else
+        begin_ray(g->b, g->index[i], g->worker, c);
+    ebpo_status status = ray_end(c, EBPO_OK, error);
+    return status == EBPO_OK ? store_result(g->b, g->index[i], g->worker, c, error) : status;
+}
+
+/* Up to four rays of a group that have one candidate each, through whose interior the ray's line
+ * certainly goes. */
+typedef struct four {
+    unsigned count, ray[4];
+    ebpo_ray_candidate candidate[4];
+} four;
+
+/* Finds the first hits of four rays. */
+static ebpo_status end_four(group *g, four *f, ebpo_error *error)
+{
+    const ebpo_accel *s = g->rays.s;
+    ebpo_status status = EBPO_OK;
+    ebpo_ray_four in;
+    double t[4];
+    for (unsigned i = 0; i < 4; i++) {
+        unsigned lane = i < f->count ? i : 0;
+        const ebpo_ray *ray = g->rays.ray[f->ray[lane]];
+        double triangle[3][3];
+        ebpo_accel_triangle(s, f->candidate[lane].slot, triangle);
+        for (int k = 0; k < 3; k++) {
+            in.origin[k][i] = ray->origin[k];
+            in.direction[k][i] = ray->direction[k];
+            for (int corner = 0; corner < 3; corner++)
+                in.triangle[corner][k][i] = triangle[corner][k];
+        }
+        in.t_max[i] = ray->t_max;
+        in.facing[i] = f->candidate[lane].facing;
+    }
+    unsigned done = ebpo_ray_interior_four(&in, t);
+    for (unsigned i = 0; i < f->count && status == EBPO_OK; i++) {
+        uint64_t face = ebpo_accel_source_face(s, ebpo_accel_slot_face(s, f->candidate[i].slot));
+        if (done >> i & 1)
+            store_first(g->b, g->index[f->ray[i]], (ebpo_ray_hit){ t[i], face, in.facing[i] });
+        else
+            status = end_ray(g, f->ray[i], error);
+    }
+    f->count = 0;
+    return status;
+}
+
 /* Finds the hits of a group of one or more rays. Results are those of cast_one. */
 static ebpo_status cast_group(group *g, ebpo_error *error)
 {
     const ebpo_accel *s = g->rays.s;
-    bool pruned = g->b->context[g->worker]->model->info->pruned;
+    const ebpo_model *m = g->b->context[g->worker]->model;
+    four f = { .count = 0 };
+    unsigned count;
     ebpo_status status = EBPO_OK;
-    g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
+    m->kernels.ray->walk_many(&g->rays);
     /* Prefetches what the exact tests of candidates will read. (gcc omits calls of a separate
      * function, as it has no result.) */
-    for (unsigned i = 0; i < g->rays.count; i++)
-        for (int k = 0; g->begun[i] && k < g->begun[i]->count; k++)
-            ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, g->begun[i]->waiting[k].slot));
-    for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
-        casting *c = &g->c[i];
-        if (!g->begun[i] && !pruned) {
-            status = store_misses(g->b, g->index[i], g->index[i] + 1, g->worker, error);
-            continue;
-        }
-        if (g->begun[i])
-            end_search(g->begun[i]);
-        else
-            begin_ray(g->b, g->index[i], g->worker, c);
-        status = ray_end(c, EBPO_OK, error);
-        if (status == EBPO_OK)
-            status = store_result(g->b, g->index[i], g->worker, c, error);
+    for (unsigned i = 0; i < g->rays.count; i++) {
+        const ebpo_ray_candidate *c = candidates_of(g, i, &count);
+        for (unsigned k = 0; k < count; k++)
+            ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, c[k].slot));
     }
-    return status;
+    for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
+        const ebpo_ray_candidate *c = candidates_of(g, i, &count);
+        bool decided = g->begun[i] && (g->c[i].count || g->c[i].done);
+        if (count == 1 && c->facing && g->rays.wants == EBPO_WANTS_FIRST && !decided &&
+            !m->info->pruned) {
+            f.candidate[f.count] = *c;
+            f.ray[f.count++] = i;
+            status = f.count == 4 ? end_four(g, &f, error) : EBPO_OK;
+        } else if (count == 0 && !g->begun[i] && !m->info->pruned) {
+            status = store_misses(g->b, g->index[i], g->index[i] + 1, g->worker, error);
+        } else {
+            status = end_ray(g, i, error);
+        }
+    }
+    return status == EBPO_OK && f.count ? end_four(g, &f, error) : status;
 }
 
 /* Finds the hits of the rays begin .. end - 1, in groups. */
@@ -795,6 +880,7 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
     g->worker = worker;
     g->rays.s = b->context[worker]->model->whole;
     g->rays.wants = b->wants;
+    g->rays.facing = facing_of(b->options.sides);
     g->rays.begin = begin_of_group;
     g->rays.user = g;
     memset(g->found, 0, sizeof g->found);
@@ -953,15 +1039,6 @@ static void put_in_order(batch *b, const ebpo_model *m)
 
 ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error *error)
 {
-    double not_finite = 0; /* 0, or NaN if a sum of coordinates is not finite */
-    bool wrong = false;
-    for (uint64_t i = 0; i < count; i++) {
-        const double *o = rays[i].origin, *d = rays[i].direction;
-        not_finite += (o[0] + o[1] + o[2] + d[0] + d[1] + d[2]) * 0;
-        wrong |= ((d[0] == 0) & (d[1] == 0) & (d[2] == 0)) | !(rays[i].t_max >= 0);
-    }
-    if (not_finite == 0 && !wrong)
-        return EBPO_OK;
     for (uint64_t i = 0; i < count; i++) {
         const char *fault = ray_fault(rays[i].origin, rays[i].direction, rays[i].t_max);
         if (fault)
