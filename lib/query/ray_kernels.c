@@ -557,7 +557,6 @@ typedef struct ray_packet {
     packet_frame frame;
     ray_bundle bundle;
     float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
-    float surely[8]; /* t_max, rounded down */
     /* For tests of faces (packet_faces). high + low: the first ray's origin in the model's unit.
      * shift: origins minus the first ray's origin. moment: shift x direction. apart: false if all
      * shifts are 0. axis: the longest axis of the first direction. */
@@ -643,7 +642,7 @@ EBPO_EIGHT void packet_set(ray_packet *p)
     p->bundle.side_at = ray_side_at[signs];
 }
 
-/* Sets what tests of faces use, except `surely`. */
+/* Sets what tests of faces use. */
 EBPO_EIGHT void packet_set_faces(ray_packet *p, const ebpo_accel *s)
 {
     const packet_frame *f = &p->frame;
@@ -821,8 +820,8 @@ EBPO_EIGHT void packet_hits(const ray_packet *p, const packet_faces *b, unsigned
     f8 from = f8_pick(in, f8_sub(t, error), f8_sub(f8_min(t0, t1), size)),
        to = f8_pick(in, f8_add(t, error), f8_add(f8_max(t0, t1), size));
     alive &= ~f8_bits(f8_or(f8_less(bound, from), f8_less(to, zero)));
-    out->sure = alive & f8_bits(f8_and(f8_and(in, f8_at_most(zero, from)),
-                                       f8_at_most(to, f8_all(p->surely[ray]))));
+    /* Beyond t_max, the hit has no result, but lowers the bound: all farther hits have none. */
+    out->sure = alive & f8_bits(f8_and(in, f8_at_most(zero, from)));
     out->alive = alive;
     f8_store(out->low, from);
     f8_store(out->high, to);
@@ -1054,7 +1053,7 @@ EBPO_EIGHT void ray_walk_in_turns(ebpo_ray_search *const *ray, unsigned count, e
 EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
 {
     const ebpo_accel *s = p->g->s;
-    v4d far = v4d_all(0), beyond = v4d_all((double)EBPO_RAY_BEYOND), bound[2], surely[2];
+    v4d far = v4d_all(0), beyond = v4d_all((double)EBPO_RAY_BEYOND), bound[2];
     v4l plain = ~(v4l){ 0, 0, 0, 0 };
     for (unsigned h = 0; h < 2; h++) {
         const ebpo_ray *ray[4];
@@ -1075,11 +1074,9 @@ EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
         plain &= longest <= EBPO_RAY_LONGEST;
         v4d t = { ray[0]->t_max, ray[1]->t_max, ray[2]->t_max, ray[3]->t_max };
         bound[h] = v4d_min(t * s->scale * (1 + 0x1p-20) + 0x1p-90, beyond);
-        surely[h] = v4d_min(t * s->scale * (1 - 0x1p-20) - 0x1p-90, beyond / 2);
     }
     memcpy(f->from, p->g->ray[p->first]->origin, sizeof f->from);
     f8 bounds = f8_from_doubles(bound[0], bound[1]);
-    f8_store(p->surely, f8_from_doubles(surely[0], surely[1]));
     packet_set_bounds(p, f8_pick(f8_mask((1u << p->count) - 1), bounds, f8_all(-1)));
     double farthest = v4d_greatest(far);
     f->error = ebpo_ray_error(s, farthest);
@@ -1099,7 +1096,6 @@ static void packet_read_begun(ray_packet *p, packet_frame *f)
         const ebpo_ray_search *r = i < p->count ? p->search[i] : NULL;
         bounds = r ? packet_with_bound(bounds, i, r->bound) : bounds;
         r = r ? r : any;
-        p->surely[i] = r ? r->surely : -1;
         if (i == 0 && r)
             memcpy(f->from, r->from, sizeof f->from);
         for (int k = 0; k < 3 && r; k++) {
