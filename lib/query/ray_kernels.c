@@ -447,6 +447,10 @@ EBPO_EIGHT unsigned bundle_children(const ray_bundle *p, const ebpo_bound *b, bu
 
 /* --- bundles that miss all faces --- */
 
+/* fmax and fmin are function calls. */
+EBPO_EIGHT double greater_of(double a, double b) { return a > b ? a : b; }
+EBPO_EIGHT double lesser_of(double a, double b) { return a < b ? a : b; }
+
 /* Greatest number of nodes that ray_misses visits. */
 enum { MISS_NODES = 12 };
 /* Greatest coordinate of an origin in ray_misses, as a multiple of the accel's largest coordinate.
@@ -458,9 +462,9 @@ EBPO_EIGHT void bundle_set_axis(ray_bundle *b, int k, const double origin[2], co
                                 double error)
 {
     bool down = d[0] < 0;
-    double ahead = fmax(fabs(origin[0]), fabs(origin[1])) * 0x1p-21 + error, sign = down ? -1 : 1,
-           nearer = sign / fmax(fabs(d[!down]), 0x1p-72),
-           farther = sign / fmax(fabs(d[down]), 0x1p-72);
+    double ahead = greater_of(fabs(origin[0]), fabs(origin[1])) * 0x1p-21 + error,
+           sign = down ? -1 : 1, nearer = sign / greater_of(fabs(d[!down]), 0x1p-72),
+           farther = sign / greater_of(fabs(d[down]), 0x1p-72);
     b->near_from[k] = (float)(down ? origin[0] - ahead : origin[1] + ahead);
     b->far_from[k] = (float)(down ? origin[1] + ahead : origin[0] - ahead);
     b->near_inverse[k] = (float)nearer;
@@ -497,9 +501,9 @@ EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *r
         d[k][1] = v4d_greatest(d_most[k]);
         if (d[k][0] < 0 && d[k][1] > 0)
             return false;
-        greatest = fmax(greatest, fmax(fabs(origin[k][0]), fabs(origin[k][1])));
-        longest = fmax(longest, fmax(fabs(d[k][0]), fabs(d[k][1])));
-        sure = fmax(sure, fmin(fabs(d[k][0]), fabs(d[k][1])));
+        greatest = greater_of(greatest, greater_of(fabs(origin[k][0]), fabs(origin[k][1])));
+        longest = greater_of(longest, greater_of(fabs(d[k][0]), fabs(d[k][1])));
+        sure = greater_of(sure, lesser_of(fabs(d[k][0]), fabs(d[k][1])));
         signs |= (unsigned)(d[k][0] < 0) << k;
     }
     if (!(longest <= EBPO_RAY_LONGEST && sure >= EBPO_RAY_SHORTEST && s->scale < INFINITY &&
@@ -666,7 +670,7 @@ EBPO_EIGHT void packet_set_faces(ray_packet *p, const ebpo_accel *s)
     }
     double width = v4d_greatest(widest), way = s->largest_coordinate + width;
     for (int k = 0; k < 3; k++)
-        way = fmax(way, s->largest_coordinate + width + fabs(f->origin[k][0][0]));
+        way = greater_of(way, s->largest_coordinate + width + fabs(f->origin[k][0][0]));
     p->apart = width > 0;
     for (int k = 0; k < 3 && p->apart; k++) {
         int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
