@@ -456,7 +456,6 @@ enum { MISS_NODES = 12 };
 /* Greatest coordinate of an origin in ray_misses, as a multiple of the accel's largest coordinate.
  * Origins are not moved, so the bounds of a bundle from far away are wide. */
 static const double miss_reach = 64;
-
 /* Sets the bundle on one axis, from the least and greatest origin and direction in the frame. */
 EBPO_EIGHT void bundle_set_axis(ray_bundle *b, int k, const double origin[2], const double d[2],
                                 double error)
@@ -506,8 +505,8 @@ EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *r
         sure = greater_of(sure, lesser_of(fabs(d[k][0]), fabs(d[k][1])));
         signs |= (unsigned)(d[k][0] < 0) << k;
     }
-    if (!(longest <= EBPO_RAY_LONGEST && sure >= EBPO_RAY_SHORTEST && s->scale < INFINITY &&
-          greatest <= miss_reach * s->largest_coordinate))
+    if (!(longest <= EBPO_RAY_LONGEST && sure >= EBPO_RAY_SHORTEST && s->scale > 0 &&
+          s->scale < INFINITY && greatest <= miss_reach * s->largest_coordinate))
         return false;
     for (int k = 0; k < 3; k++)
         bundle_set_axis(b, k, origin[k], d[k], ebpo_ray_error(s, greatest));
@@ -521,7 +520,7 @@ static bool ray_misses(const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
     ray_bundle bundle;
     uint32_t stack[8 * MISS_NODES];
     unsigned top = 0;
-    if (!bundle_set(&bundle, s, ray, count) || s->root_bound & EBPO_IS_BLOCK)
+    if (s->root_bound & EBPO_IS_BLOCK || !bundle_set(&bundle, s, ray, count))
         return false;
     stack[top++] = s->root_bound;
     for (int visits = 0; top; visits++) {

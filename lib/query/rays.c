@@ -686,21 +686,16 @@ static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *
     return status;
 }
 
-/* Stores the results of rays without hits. */
-static ebpo_status store_misses(batch *b, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+/* Stores the result of ray i, which has no hit. */
+static ebpo_status store_miss(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
 {
-    casting none = { .count = 0 };
-    ebpo_status status = EBPO_OK;
-    for (uint64_t i = begin; i < end && b->wants == EBPO_WANTS_FIRST; i++)
+    if (b->wants == EBPO_WANTS_FIRST) {
         store_first(b, i, no_hit);
-    if (b->wants == EBPO_WANTS_FIRST)
         return EBPO_OK;
-    none.context = b->context[worker];
-    none.found = &none.context->unsorted_hits;
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++)
-        status = store_result(b, i, worker, &none, error);
-    return status;
+    }
+    casting none;
+    begin_ray(b, i, worker, &none);
+    return store_result(b, i, worker, &none, error);
 }
 
 /* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
@@ -841,7 +836,7 @@ static ebpo_status cast_group(group *g, ebpo_error *error)
             f.ray[f.count++] = i;
             status = f.count == 4 ? end_four(g, &f, error) : EBPO_OK;
         } else if (count == 0 && !g->begun[i] && !m->info->pruned) {
-            status = store_misses(g->b, g->index[i], g->index[i] + 1, g->worker, error);
+            status = store_miss(g->b, g->index[i], g->worker, error);
         } else {
             status = end_ray(g, i, error);
         }
@@ -856,9 +851,12 @@ static ebpo_status cast_part(group *g, uint64_t begin, uint64_t end, ebpo_error 
     const ebpo_model *m = b->context[g->worker]->model;
     ebpo_status status = EBPO_OK;
     /* In a subset, rays that miss all faces may come through pruned nodes. */
-    if (end - begin > 1 && !b->options.done && !m->info->pruned &&
-        m->kernels.ray->misses(m->whole, b->rays + begin, (unsigned)(end - begin)))
-        return store_misses(g->b, begin, end, g->worker, error);
+    bool miss = end - begin > 1 && !b->options.done && !m->info->pruned &&
+                m->kernels.ray->misses(m->whole, b->rays + begin, (unsigned)(end - begin));
+    for (uint64_t i = begin; i < end && miss && status == EBPO_OK; i++)
+        status = store_miss(g->b, i, g->worker, error);
+    if (miss)
+        return status;
     for (uint64_t i = begin; i < end && status == EBPO_OK;) {
         g->rays.count = 0;
         for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
