@@ -11,9 +11,10 @@
 #include "query/query_model.h"
 #include "query_support.h"
 
-/* Kernels that count how many sides of boxes they decode for eight children at a time. They also
- * count descents: visits of nodes of `counted_accel` at once after the visit of the parent. */
-static uint64_t decoded_sides, descents;
+/* Kernels that count how many sides of boxes they decode for eight children at a time, and how many
+ * products of eight numbers they compute. They also count descents: visits of nodes of
+ * `counted_accel` at once after the visit of the parent. */
+static uint64_t decoded_sides, products, descents;
 static const ebpo_accel *counted_accel;
 static void count_descent(const uint8_t *x)
 {
@@ -30,7 +31,13 @@ EBPO_EIGHT f8 decode_sides(const uint8_t *x)
         count_descent(x);
     return f8_from_bytes(x);
 }
+EBPO_EIGHT f8 multiply(f8 a, f8 b)
+{
+    products++;
+    return f8_mul(a, b);
+}
 #define f8_from_bytes      decode_sides
+#define f8_mul             multiply
 #define EBPO_KERNEL_SUFFIX counted
 #include "query/ray_kernels.c"
 
@@ -269,7 +276,7 @@ static uint64_t count_sides_aside(query_model *m, double aside, uint64_t part, u
                               { (i % SIDE - SIDE / 2) * 0x1p-7 + aside,
                                 (i / SIDE - SIDE / 2) * 0x1p-7, -1 },
                               INFINITY };
-    decoded_sides = 0;
+    decoded_sides = products = 0;
     for (uint64_t i = 0; i < SIDE * SIDE; i += part)
         ASSERT_OK(ebpo_ray_first_many(m->context, rays + i, part, &options, hits + i, error));
     *hit = 0;
@@ -301,10 +308,14 @@ START_TEST(test_coherent_rays_share_nodes)
     query_model m;
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
     m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
-    uint64_t hits, single = count_sides(&m, 1, &hits),
+    uint64_t hits, single = count_sides(&m, 1, &hits), single_products = products,
                    together = count_sides(&m, EBPO_RAY_PACKET, &hits);
     ck_assert_msg(together > 0 && 3 * together < single, "%llu sides, single rays %llu",
                   (unsigned long long)together, (unsigned long long)single);
+    /* Rays also share the corners and edges of faces. */
+    ck_assert_msg(products > 0 && 4 * products < 3 * single_products,
+                  "%llu products, single rays %llu", (unsigned long long)products,
+                  (unsigned long long)single_products);
     query_model_free(&m);
 }
 END_TEST
