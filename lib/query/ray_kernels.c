@@ -520,7 +520,7 @@ static bool ray_misses(const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
     ray_bundle bundle;
     uint32_t stack[8 * MISS_NODES];
     unsigned top = 0;
-    if (s->root_bound & EBPO_IS_BLOCK || !bundle_set(&bundle, s, ray, count))
+    if (s->bound_count == 0 || s->root_bound & EBPO_IS_BLOCK || !bundle_set(&bundle, s, ray, count))
         return false;
     stack[top++] = s->root_bound;
     for (int visits = 0; top; visits++) {
