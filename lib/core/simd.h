@@ -403,8 +403,13 @@ EBPO_EIGHT v4d v4d_pick(v4l mask, v4d yes, v4d no)
 {
     return (v4d)(((v4l)yes & mask) | ((v4l)no & ~mask));
 }
+#if defined(EBPO_SIMD_AVX2)
+EBPO_EIGHT v4d v4d_max(v4d a, v4d b) { return (v4d)_mm256_max_pd((__m256d)a, (__m256d)b); }
+EBPO_EIGHT v4d v4d_min(v4d a, v4d b) { return (v4d)_mm256_min_pd((__m256d)a, (__m256d)b); }
+#else
 EBPO_EIGHT v4d v4d_max(v4d a, v4d b) { return v4d_pick(a > b, a, b); }
 EBPO_EIGHT v4d v4d_min(v4d a, v4d b) { return v4d_pick(a < b, a, b); }
+#endif
 /* Returns the greatest of the four doubles. */
 EBPO_EIGHT double v4d_greatest(v4d a)
 {

@@ -188,22 +188,54 @@ static inline ebpo_bounded dot_bounded(const plane_normal *n, const ebpo_pair y[
     return out;
 }
 
-static void intersect_plane(const ebpo_segment *ray, const double triangle[3][3],
-                            ebpo_plane_pairs *out)
+/* Computes numerator and denominator of t (ebpo_plane_pairs). */
+static inline void plane_fraction(const double origin[3], const double direction[3],
+                                  const double triangle[3][3], ebpo_bounded *numerator,
+                                  ebpo_bounded *denominator)
 {
     ebpo_pair f[3], g[3], to_plane[3], d[3];
     for (int k = 0; k < 3; k++) {
         f[k] = ebpo_two_difference(triangle[1][k], triangle[0][k]);
         g[k] = ebpo_two_difference(triangle[2][k], triangle[0][k]);
-        to_plane[k] = ebpo_two_difference(triangle[0][k], ray->origin[k]);
-        d[k] = ebpo_pair_of(ray->direction[k]);
+        to_plane[k] = ebpo_two_difference(triangle[0][k], origin[k]);
+        d[k] = ebpo_pair_of(direction[k]);
     }
     plane_normal n = cross_bounded(f, g);
-    ebpo_bounded a = dot_bounded(&n, to_plane), b = dot_bounded(&n, d);
+    *numerator = dot_bounded(&n, to_plane);
+    *denominator = dot_bounded(&n, d);
+}
+
+static void intersect_plane(const ebpo_segment *ray, const double triangle[3][3],
+                            ebpo_plane_pairs *out)
+{
+    ebpo_bounded a, b;
+    plane_fraction(ray->origin, ray->direction, triangle, &a, &b);
     double error = a.error / fabs(a.x.head) + b.error / fabs(b.x.head);
     out->numerator = a;
     out->denominator = b;
     out->has_quotient = ebpo_pair_quotient(a.x, b.x, error, out->quotient);
+}
+
+/* The loop has no branches, so that compilers use vectors. */
+static void intersect_four_planes(const ebpo_ray_four *restrict in, ebpo_plane_four *restrict out)
+{
+    for (int i = 0; i < 4; i++) {
+        double origin[3], direction[3], triangle[3][3];
+        for (int k = 0; k < 3; k++) {
+            origin[k] = in->origin[k][i];
+            direction[k] = in->direction[k][i];
+            for (int corner = 0; corner < 3; corner++)
+                triangle[corner][k] = in->triangle[corner][k][i];
+        }
+        ebpo_bounded a, b;
+        plane_fraction(origin, direction, (const double(*)[3])triangle, &a, &b);
+        out->numerator[i] = a.x.head;
+        out->numerator_error[i] = a.error;
+        out->error[i] = a.error / fabs(a.x.head) + b.error / fabs(b.x.head);
+        double q = a.x.head / b.x.head;
+        ebpo_pair_quotient_near(a.x, b.x, out->error[i], q, &out->least[i], &out->greatest[i]);
+        out->rounded[i] = q;
+    }
 }
 
 static void edge_side(const double d[3], const ebpo_pair a[3], const double from[3],
@@ -218,4 +250,5 @@ static void edge_side(const double d[3], const ebpo_pair a[3], const double from
     *out = dot_bounded(&n, direction);
 }
 
-const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { intersect_plane, edge_side };
+const ebpo_ray_pairs EBPO_KERNEL(ebpo_ray_pairs) = { intersect_plane, intersect_four_planes,
+                                                     edge_side };

@@ -46,8 +46,16 @@ typedef struct ebpo_plane_pairs {
     double quotient[2];
 } ebpo_plane_pairs;
 
+/* The same for four lines at once, each with a triangle in the same lane. error: sum of the
+ * relative errors of numerator and denominator. rounded: approximate t. least, greatest: the result
+ * of ebpo_pair_quotient, if ebpo_pair_quotient_in_range is true for `rounded`. */
+typedef struct ebpo_plane_four {
+    double numerator[4], numerator_error[4], error[4], rounded[4], least[4], greatest[4];
+} ebpo_plane_four;
+
 typedef struct ebpo_ray_pairs {
     void (*plane)(const ebpo_segment *ray, const double triangle[3][3], ebpo_plane_pairs *out);
+    void (*four_planes)(const ebpo_ray_four *in, ebpo_plane_four *out);
     /* Computes d . (a x e), where e = to - from is an edge. */
     void (*edge)(const double d[3], const ebpo_pair a[3], const double from[3], const double to[3],
                  ebpo_bounded *out);

@@ -202,19 +202,32 @@ static inline ebpo_pair ebpo_pair_divide(ebpo_pair a, ebpo_pair b)
     return ebpo_pair_add(ebpo_pair_of(first), ebpo_pair_of(rest.head / b.head));
 }
 
+/* Computes ebpo_pair_quotient's two doubles from q = a.head / b.head, without its checks. */
+static inline void ebpo_pair_quotient_near(ebpo_pair a, ebpo_pair b, double error, double q,
+                                           double *least, double *greatest)
+{
+    ebpo_pair back = ebpo_two_product(q, b.head);
+    double rest = ((a.head - back.head) - back.tail) + (a.tail - q * b.tail);
+    double correction = rest / b.head, margin = fabs(q) * (error + 0x1p-100);
+    *least = q + (correction - margin);
+    *greatest = q + (correction + margin);
+}
+
+/* Returns true if a quotient q (ebpo_pair_quotient_near) is neither too large nor too small. */
+static inline bool ebpo_pair_quotient_in_range(double q, double error)
+{
+    return fabs(q) >= 0x1p-900 && fabs(q) <= 0x1p900 && error <= 0x1p-56;
+}
+
 /* Computes two doubles. At least one of them is the exact a / b, rounded to nearest. The two
  * doubles are equal if the rounding is certain, and otherwise adjacent. `error`: sum of the
  * relative errors of a and b. Returns false if the quotient is too large or too small. */
 static inline bool ebpo_pair_quotient(ebpo_pair a, ebpo_pair b, double error, double out[2])
 {
     double q = a.head / b.head;
-    if (!(fabs(q) >= 0x1p-900 && fabs(q) <= 0x1p900 && error <= 0x1p-56))
+    if (!ebpo_pair_quotient_in_range(q, error))
         return false;
-    ebpo_pair back = ebpo_two_product(q, b.head);
-    double rest = ((a.head - back.head) - back.tail) + (a.tail - q * b.tail);
-    double correction = rest / b.head, margin = fabs(q) * (error + 0x1p-100);
-    out[0] = q + (correction - margin);
-    out[1] = q + (correction + margin);
+    ebpo_pair_quotient_near(a, b, error, q, &out[0], &out[1]);
     return out[0] == out[0] && out[1] == out[1];
 }
 

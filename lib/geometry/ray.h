@@ -59,6 +59,17 @@ void ebpo_ray_share(const double triangle[3][3], const ebpo_ray_intersection *at
 bool ebpo_ray_shares(const ebpo_segment *ray, const ebpo_ray_shared *shared,
                      const double triangle[3][3], ebpo_ray_intersection *out);
 
+/* Four rays, each with a triangle whose interior the ray's line certainly passes. The last index is
+ * the ray. facing: as in ebpo_ray_intersection, not 0. */
+typedef struct ebpo_ray_four {
+    double origin[3][4], direction[3][4], t_max[4], triangle[3][3][4];
+    int facing[4];
+} ebpo_ray_four;
+
+/* Computes t of four intersections. Returns a bit for each ray for which ebpo_ray_interior would
+ * return an intersection with this t. Rays without the bit need ebpo_ray_interior. */
+unsigned ebpo_ray_interior_four(const ebpo_ray_four *four, double t[4]);
+
 /* Returns the exact sign of t(a) - t(b), where t is the parameter of the first common point with a
  * triangle. The ray must intersect both triangles, and at_a and at_b must be the results of
  * ebpo_ray_triangle. */

@@ -748,6 +748,22 @@ void ebpo_ray_interior(const ebpo_segment *ray, const double triangle[3][3], int
         ebpo_ray_triangle_exact(ray, triangle, out);
 }
 
+unsigned ebpo_ray_interior_four(const ebpo_ray_four *four, double t[4])
+{
+    ebpo_plane_four at;
+    unsigned done = 0;
+    ebpo_ray_pairs_best()->four_planes(four, &at);
+    for (int i = 0; i < 4; i++) {
+        double numerator = -four->facing[i] * at.numerator[i], t_max = four->t_max[i];
+        t[i] = at.least[i];
+        if (numerator > at.numerator_error[i] &&
+            ebpo_pair_quotient_in_range(at.rounded[i], at.error[i]) &&
+            at.least[i] == at.greatest[i] && (t_max == INFINITY || certainly_less(t[i], t_max)))
+            done |= 1u << i;
+    }
+    return done;
+}
+
 int ebpo_ray_compare(const ebpo_segment *ray, const double a[3][3],
                      const ebpo_ray_intersection *at_a, const double b[3][3],
                      const ebpo_ray_intersection *at_b)

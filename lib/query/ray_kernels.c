@@ -408,37 +408,173 @@ static ebpo_ray_search *ray_begin(const ebpo_ray_group *g, unsigned i)
     return r;
 }
 
-/* A packet visits the boxes that its *bundle* may intersect. On each axis, the bundle has one
- * origin and one inverse direction for the nearer sides of boxes, and others for the farther sides.
- * They are chosen among those of the packet's rays, so that the bundle enters a box before each of
- * its rays, and leaves it after each: for a positive direction, the nearer sides get the greatest
- * origin and the least inverse, the farther sides the least origin and the greatest inverse. (An
- * inverse that is wrong for a side behind the origin does not matter: the bundle then enters at a
- * negative t, or misses, as all rays do.) The proof for one ray (docs/develop/bounds.md, "A ray
- * against boxes") holds for the bundle, too. It compares the rounding errors with the shift of the
- * origin, at least 8u|o| + E. The shift of the ray whose origin was chosen is as large as this; any
- * other ray's origin is at a distance of at least its own shift from the chosen origin, and if the
- * two origins differ in size, at a greater distance.
+/* Several rays together visit the boxes that their *bundle* may intersect. On each axis, the bundle
+ * has one origin and one inverse direction for the nearer sides of boxes, and others for the
+ * farther sides. They are chosen among those of the rays, so that the bundle enters a box before
+ * each of its rays, and leaves it after each: for a positive direction, the nearer sides get the
+ * greatest origin and the least inverse, the farther sides the least origin and the greatest
+ * inverse. (An inverse that is wrong for a side behind the origin does not matter: the bundle then
+ * enters at a negative t, or misses, as all rays do.) The proof for one ray
+ * (docs/develop/bounds.md, "A ray against boxes") holds for the bundle, too. It compares the
+ * rounding errors with the shift of the origin, at least 8u|o| + E. The shift of the ray whose
+ * origin was chosen is as large as this; any other ray's origin is at a distance of at least its
+ * own shift from the chosen origin, and if the two origins differ in size, at a greater distance.
  *
- * Then each child that the bundle may intersect is tested for each ray. If one ray is left, this
- * ray walks on alone. Arrays of [4] are those of ebpo_ray_search, for the bundle; arrays of eight
- * floats have a ray in each lane. */
-typedef struct ray_packet {
-    ebpo_ray_group *g;
-    unsigned first, count;                    /* the group's rays first .. first + count - 1 */
-    ebpo_ray_search *search[EBPO_RAY_PACKET]; /* NULL: not begun */
+ * The arrays are those of ebpo_ray_search. */
+typedef struct ray_bundle {
     const uint8_t (*side_at)[3];
-    float near_from[4], far_from[4], near_inverse[4], far_inverse[4], near_step[4], far_step[4];
+    float near_from[3], far_from[3], near_inverse[3], far_inverse[3];
     float bound; /* the greatest bound of all rays */
-    float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
-} ray_packet;
+} ray_bundle;
+
+/* The nearer and farther sides of a node's eight boxes on each axis. */
+typedef struct bundle_sides {
+    float near[3][8], far[3][8];
+} bundle_sides;
+
+/* Returns a bit for each child whose box the bundle may intersect (ray_children). */
+EBPO_EIGHT unsigned bundle_children(const ray_bundle *p, const ebpo_bound *b, bundle_sides *sides,
+                                    f8 *enter)
+{
+    f8 from = f8_all(0), to = f8_all(p->bound);
+    for (int k = 0; k < 3; k++) {
+        f8 origin = f8_all(b->origin[k]), step = f8_all(b->step[k]),
+           near = side_at(b, p->side_at[0][k], step, origin),
+           far = side_at(b, p->side_at[1][k], step, origin);
+        f8_store(sides->near[k], near);
+        f8_store(sides->far[k], far);
+        from =
+            f8_max(f8_mul(f8_sub(near, f8_all(p->near_from[k])), f8_all(p->near_inverse[k])), from);
+        to = f8_min(f8_mul(f8_sub(far, f8_all(p->far_from[k])), f8_all(p->far_inverse[k])), to);
+    }
+    *enter = from;
+    return f8_bits(f8_at_most(from, to)) & ((1u << b->count) - 1);
+}
+
+/* --- bundles that miss all faces --- */
+
+/* fmax and fmin are function calls. */
+EBPO_EIGHT double greater_of(double a, double b) { return a > b ? a : b; }
+EBPO_EIGHT double lesser_of(double a, double b) { return a < b ? a : b; }
+
+/* Greatest number of nodes that ray_misses visits. */
+enum { MISS_NODES = 12 };
+/* Greatest coordinate of an origin in ray_misses, as a multiple of the accel's largest coordinate.
+ * Origins are not moved, so the bounds of a bundle from far away are wide. */
+static const double miss_reach = 64;
+/* Sets the bundle on one axis, from the least and greatest origin and direction in the frame. */
+EBPO_EIGHT void bundle_set_axis(ray_bundle *b, int k, const double origin[2], const double d[2],
+                                double error)
+{
+    bool down = d[0] < 0;
+    double ahead = greater_of(fabs(origin[0]), fabs(origin[1])) * 0x1p-21 + error,
+           sign = down ? -1 : 1, nearer = sign / greater_of(fabs(d[!down]), 0x1p-72),
+           farther = sign / greater_of(fabs(d[down]), 0x1p-72);
+    b->near_from[k] = (float)(down ? origin[0] - ahead : origin[1] + ahead);
+    b->far_from[k] = (float)(down ? origin[1] + ahead : origin[0] - ahead);
+    b->near_inverse[k] = (float)nearer;
+    b->far_inverse[k] = (float)farther;
+}
+
+/* Sets the bundle of rays. Returns false if they have no bundle: a coordinate of their directions
+ * has both signs, the directions need to be scaled, or the origins are far away. */
+EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
+{
+    v4d least[3], most[3], d_least[3], d_most[3]; /* of four rays each */
+    for (int k = 0; k < 3; k++) {
+        least[k] = most[k] = v4d_all(ray->origin[k]);
+        d_least[k] = d_most[k] = v4d_all(ray->direction[k]);
+    }
+    for (unsigned i = 0; i < count; i += 4) {
+        const ebpo_ray *a = ray + i, *last = ray + count - 1, *x = a + 1 < last ? a + 1 : last,
+                       *y = a + 2 < last ? a + 2 : last, *z = a + 3 < last ? a + 3 : last;
+        for (int k = 0; k < 3; k++) {
+            v4d o = { a->origin[k], x->origin[k], y->origin[k], z->origin[k] },
+                d = { a->direction[k], x->direction[k], y->direction[k], z->direction[k] };
+            least[k] = v4d_min(o, least[k]);
+            most[k] = v4d_max(o, most[k]);
+            d_least[k] = v4d_min(d, d_least[k]);
+            d_most[k] = v4d_max(d, d_most[k]);
+        }
+    }
+    double origin[3][2], d[3][2], greatest = 0, longest = 0, sure = 0;
+    unsigned signs = 0;
+    for (int k = 0; k < 3; k++) {
+        origin[k][0] = (-v4d_greatest(-least[k]) - s->centre[k]) * s->scale;
+        origin[k][1] = (v4d_greatest(most[k]) - s->centre[k]) * s->scale;
+        d[k][0] = -v4d_greatest(-d_least[k]);
+        d[k][1] = v4d_greatest(d_most[k]);
+        if (d[k][0] < 0 && d[k][1] > 0)
+            return false;
+        greatest = greater_of(greatest, greater_of(fabs(origin[k][0]), fabs(origin[k][1])));
+        longest = greater_of(longest, greater_of(fabs(d[k][0]), fabs(d[k][1])));
+        sure = greater_of(sure, lesser_of(fabs(d[k][0]), fabs(d[k][1])));
+        signs |= (unsigned)(d[k][0] < 0) << k;
+    }
+    if (!(longest <= EBPO_RAY_LONGEST && sure >= EBPO_RAY_SHORTEST && s->scale > 0 &&
+          s->scale < INFINITY && greatest <= miss_reach * s->largest_coordinate))
+        return false;
+    for (int k = 0; k < 3; k++)
+        bundle_set_axis(b, k, origin[k], d[k], ebpo_ray_error(s, greatest));
+    b->side_at = ray_side_at[signs];
+    b->bound = EBPO_RAY_BEYOND;
+    return true;
+}
+
+static bool ray_misses(const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
+{
+    ray_bundle bundle;
+    uint32_t stack[8 * MISS_NODES];
+    unsigned top = 0;
+    if (s->bound_count == 0 || s->root_bound & EBPO_IS_BLOCK || !bundle_set(&bundle, s, ray, count))
+        return false;
+    stack[top++] = s->root_bound;
+    for (int visits = 0; top; visits++) {
+        bundle_sides sides;
+        f8 enter;
+        const ebpo_bound *b = &s->bound[stack[--top]];
+        if (visits == MISS_NODES)
+            return false;
+        for (unsigned lanes = bundle_children(&bundle, b, &sides, &enter); lanes;
+             lanes &= lanes - 1) {
+            uint32_t child = b->child[__builtin_ctz(lanes)];
+            if (child & EBPO_IS_BLOCK)
+                return false;
+            stack[top++] = child;
+        }
+    }
+    return true;
+}
+
+/* --- packets: eight rays walked together --- */
 
 /* The rays of a packet in the frame, as in ebpo_ray_search: four in each vector. Unused lanes
  * repeat another ray. */
 typedef struct packet_frame {
     v4d origin[3][2], direction[3][2];
-    double error; /* the greatest of all rays */
+    double from[3]; /* the first ray's origin in the model's unit */
+    double error;   /* the greatest of all rays */
 } packet_frame;
+
+/* Each child that the bundle may intersect is tested for each ray. If one ray is left, this ray
+ * walks on alone. Arrays of eight floats have a ray in each lane; all numbers are in the frame,
+ * except `high` and `low`. */
+typedef struct ray_packet {
+    ebpo_ray_group *g;
+    unsigned first, count;                    /* the group's rays first .. first + count - 1 */
+    ebpo_ray_search *search[EBPO_RAY_PACKET]; /* NULL: not begun */
+    packet_frame frame;
+    ray_bundle bundle;
+    float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
+    /* For tests of faces (packet_faces). high + low: the first ray's origin in the model's unit.
+     * shift: origins minus the first ray's origin. moment: shift x direction. apart: false if all
+     * shifts are 0. axis: the longest axis of the first direction. */
+    float high[3], low[3], direction[3][8], shift[3][8], moment[3][8];
+    bool apart;
+    int axis;
+    float side_error;  /* error of sides (packet_side), per length of an edge */
+    float t_errors[8]; /* error of t for a certain weight of corners */
+} ray_packet;
 
 /* Greatest width of a bundle in an accel, in the frame. Wider packets have no advantage. */
 static const double packet_width = 0.25;
@@ -453,10 +589,10 @@ EBPO_EIGHT void packet_set_axis(ray_packet *p, int k, bool down, f8 near, f8 far
     f8_store(p->from_near[k], near);
     f8_store(p->from_far[k], far);
     f8_store(p->inverse[k], inverse);
-    p->near_from[k] = down ? f8_least(near) : greatest_of(near);
-    p->far_from[k] = down ? greatest_of(far) : f8_least(far);
-    p->near_inverse[k] = p->near_step[k + 1] = down ? most : least;
-    p->far_inverse[k] = p->far_step[k + 1] = down ? least : most;
+    p->bundle.near_from[k] = down ? f8_least(near) : greatest_of(near);
+    p->bundle.far_from[k] = down ? greatest_of(far) : f8_least(far);
+    p->bundle.near_inverse[k] = down ? most : least;
+    p->bundle.far_inverse[k] = down ? least : most;
 }
 
 /* Returns true if rays are similar enough to walk together: all directions have the same signs,
@@ -484,7 +620,7 @@ EBPO_EIGHT bool packet_is_coherent(const packet_frame *f, const ebpo_accel *s)
 EBPO_EIGHT void packet_set_bounds(ray_packet *p, f8 bounds)
 {
     f8_store(p->bounds, bounds);
-    p->bound = greatest_of(bounds);
+    p->bundle.bound = greatest_of(bounds);
 }
 
 /* Returns the bounds with another bound of ray i. */
@@ -494,8 +630,9 @@ EBPO_EIGHT f8 packet_with_bound(f8 bounds, unsigned i, float bound)
 }
 
 /* Sets what tests of boxes use (ray_set_boxes), except the bounds. */
-EBPO_EIGHT void packet_set(ray_packet *p, const packet_frame *f)
+EBPO_EIGHT void packet_set(ray_packet *p)
 {
+    const packet_frame *f = &p->frame;
     unsigned signs = 0;
     for (int k = 0; k < 3; k++) {
         bool down = v4l_mask((v4l)f->direction[k][0]) & 1;
@@ -511,45 +648,57 @@ EBPO_EIGHT void packet_set(ray_packet *p, const packet_frame *f)
                         f8_from_doubles(far[0], far[1]), f8_from_doubles(inverse[0], inverse[1]));
         signs |= (unsigned)down << k;
     }
-    p->side_at = ray_side_at[signs];
-    /* numbers that are read, but not used */
-    p->near_from[3] = p->far_from[3] = p->near_inverse[3] = p->far_inverse[3] = 0;
-    p->near_step[0] = p->far_step[0] = 0;
+    p->bundle.side_at = ray_side_at[signs];
 }
 
-/* Returns a bit for each child whose box the bundle may intersect (ray_children). */
-EBPO_EIGHT unsigned packet_children(const ray_packet *p, const ebpo_bound *b, f8 *enter)
+/* Sets what tests of faces use. */
+EBPO_EIGHT void packet_set_faces(ray_packet *p, const ebpo_accel *s)
 {
-    f8 origin = f8_load_twice(b->origin), step = f8_load_twice(b->origin + 2),
-       near_step = f8_mul(step, f8_load_twice(p->near_step)),
-       far_step = f8_mul(step, f8_load_twice(p->far_step)),
-       near = f8_mul(f8_sub(origin, f8_load_twice(p->near_from)), f8_load_twice(p->near_inverse)),
-       far = f8_mul(f8_sub(origin, f8_load_twice(p->far_from)), f8_load_twice(p->far_inverse));
-    const uint8_t(*at)[3] = p->side_at;
-    f8 from =
-        f8_max(f8_max(side_at(b, at[0][0], f8_spread1(near_step), f8_spread0(near)),
-                      side_at(b, at[0][1], f8_spread2(near_step), f8_spread1(near))),
-               f8_max(side_at(b, at[0][2], f8_spread3(near_step), f8_spread2(near)), f8_all(0)));
-    f8 to = f8_min(f8_min(side_at(b, at[1][0], f8_spread1(far_step), f8_spread0(far)),
-                          side_at(b, at[1][1], f8_spread2(far_step), f8_spread1(far))),
-                   f8_min(side_at(b, at[1][2], f8_spread3(far_step), f8_spread2(far)),
-                          f8_all(p->bound)));
-    *enter = from;
-    return f8_bits(f8_at_most(from, to)) & ((1u << b->count) - 1);
+    const packet_frame *f = &p->frame;
+    v4d longest = v4d_all(0), widest = v4d_all(0);
+    f8 shift[3], d[3];
+    p->axis = 0;
+    for (int k = 0; k < 3; k++) {
+        v4d first = v4d_all(f->origin[k][0][0]), x = f->origin[k][0] - first,
+            y = f->origin[k][1] - first;
+        longest = v4d_max(v4d_abs(f->direction[k][0]), longest);
+        longest = v4d_max(v4d_abs(f->direction[k][1]), longest);
+        widest = v4d_max(v4d_abs(x), v4d_max(v4d_abs(y), widest));
+        if (fabs(f->direction[k][0][0]) > fabs(f->direction[p->axis][0][0]))
+            p->axis = k;
+        shift[k] = f8_from_doubles(x, y);
+        d[k] = f8_from_doubles(f->direction[k][0], f->direction[k][1]);
+        f8_store(p->shift[k], shift[k]);
+        f8_store(p->direction[k], d[k]);
+        p->high[k] = (float)f->from[k];
+        p->low[k] = (float)(f->from[k] - (double)p->high[k]);
+    }
+    double width = v4d_greatest(widest), way = s->largest_coordinate + width;
+    for (int k = 0; k < 3; k++)
+        way = greater_of(way, s->largest_coordinate + width + fabs(f->origin[k][0][0]));
+    p->apart = width > 0;
+    for (int k = 0; k < 3 && p->apart; k++) {
+        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+        f8_store(p->moment[k], f8_sub(f8_mul(shift[u], d[v]), f8_mul(shift[v], d[u])));
+    }
+    float reach = (float)(way + f->error * 0x1p23 + 0x1p-30);
+    p->side_error = reach * (float)v4d_greatest(longest) * 0x1.2p-18f;
+    f8_store(p->t_errors, f8_mul(f8_abs(f8_load(p->inverse[p->axis])), f8_all(reach * 0x1p-19f)));
 }
 
-/* Returns a bit for each ray that may intersect the box of this child before the ray's bound. */
-EBPO_EIGHT unsigned packet_rays(const ray_packet *p, const ebpo_bound *b, unsigned lane)
+/* Returns a bit for each ray that may intersect the box of child `lane` before the ray's bound.
+ * *enter: the t at which each ray enters the box. */
+EBPO_EIGHT unsigned packet_rays(const ray_packet *p, const bundle_sides *sides, unsigned lane,
+                                f8 *enter)
 {
-    const uint8_t *sides = (const uint8_t *)b + lane;
     f8 from = f8_all(0), to = f8_load(p->bounds);
     for (int k = 0; k < 3; k++) {
-        f8 near = f8_all(b->origin[k] + b->step[k] * (float)sides[p->side_at[0][k]]),
-           far = f8_all(b->origin[k] + b->step[k] * (float)sides[p->side_at[1][k]]),
+        f8 near = f8_all(sides->near[k][lane]), far = f8_all(sides->far[k][lane]),
            inverse = f8_load(p->inverse[k]);
         from = f8_max(f8_mul(f8_sub(near, f8_load(p->from_near[k])), inverse), from);
         to = f8_min(f8_mul(f8_sub(far, f8_load(p->from_far[k])), inverse), to);
     }
+    *enter = from;
     return f8_bits(f8_at_most(from, to));
 }
 
@@ -562,86 +711,290 @@ static ebpo_ray_search *packet_search(ray_packet *p, unsigned i)
     return p->search[i];
 }
 
-/* Visits a block with the rays that may intersect its box. */
-EBPO_EIGHT void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block, unsigned rays,
-                             bool wide)
+/* The faces of a block, relative to the first origin of a packet. Edge i is from corner i to the
+ * next corner. */
+typedef struct packet_faces {
+    f8 corner[3][3]; /* [axis][corner] */
+    f8 edge[3][3];   /* [axis][edge] */
+    f8 turn[3][3];   /* [axis][edge] corner i x edge i */
+    f8 error;        /* bound of the error of sides (packet_side) */
+    unsigned lanes;  /* a bit for each face */
+} packet_faces;
+
+/* Reads the corners and edges of a block on one axis. */
+EBPO_EIGHT void packet_read_axis(const ray_packet *p, const ebpo_accel *s, const ebpo_face_block *b,
+                                 int axis, packet_faces *out)
 {
-    ray_corners read, relative;
-    f8 bounds = f8_load(p->bounds);
-    if (!wide) {
-        ebpo_face_block faces = ebpo_face_block_open(s, block);
-        for (int k = 0; k < 3; k++)
-            ebpo_face_block_floats(&faces, k, read.axis[k]);
+    f8 x[3], high = f8_all(p->high[axis]), low = f8_all(p->low[axis]),
+             scale = f8_all((float)s->scale);
+    ebpo_face_block_floats(b, axis, x);
+    for (int i = 0; i < 3; i++) {
+        out->corner[axis][i] = f8_mul(f8_sub(f8_sub(x[i], high), low), scale);
+        out->edge[axis][i] = f8_mul(f8_sub(x[i == 2 ? 0 : i + 1], x[i]), scale);
     }
+}
+
+/* Does the same for blocks of doubles. */
+static void packet_read_wide(const ray_packet *p, const ebpo_accel *s, const ebpo_face_block *b,
+                             int axis, packet_faces *out)
+{
+    double x[3][EBPO_BLOCK];
+    float at[3][EBPO_BLOCK], along[3][EBPO_BLOCK];
+    ebpo_face_block_doubles(b, axis, x);
+    for (int i = 0; i < 3; i++)
+        for (int lane = 0; lane < EBPO_BLOCK; lane++) {
+            at[i][lane] = (float)((x[i][lane] - p->frame.from[axis]) * s->scale);
+            along[i][lane] = (float)((x[i == 2 ? 0 : i + 1][lane] - x[i][lane]) * s->scale);
+        }
+    for (int i = 0; i < 3; i++) {
+        out->corner[axis][i] = f8_load(at[i]);
+        out->edge[axis][i] = f8_load(along[i]);
+    }
+}
+
+/* Computes one axis of the turns. Returns the greatest size of the edges on this axis. */
+EBPO_EIGHT f8 packet_turn(packet_faces *f, int axis, int u, int v)
+{
+    const f8 *e = f->edge[axis];
+    for (int i = 0; i < 3; i++)
+        f->turn[axis][i] =
+            f8_sub(f8_mul(f->corner[u][i], f->edge[v][i]), f8_mul(f->corner[v][i], f->edge[u][i]));
+    return f8_max3(f8_abs(e[0]), f8_abs(e[1]), f8_abs(e[2]));
+}
+
+EBPO_EIGHT void packet_set_block(const ray_packet *p, const ebpo_accel *s, uint32_t block,
+                                 packet_faces *out)
+{
+    ebpo_face_block b = ebpo_face_block_open(s, block);
+    if (__builtin_expect(s->wide, 0)) {
+        for (int k = 0; k < 3; k++)
+            packet_read_wide(p, s, &b, k, out);
+    } else {
+        packet_read_axis(p, s, &b, 0, out);
+        packet_read_axis(p, s, &b, 1, out);
+        packet_read_axis(p, s, &b, 2, out);
+    }
+    f8 longest =
+        f8_max3(packet_turn(out, 0, 1, 2), packet_turn(out, 1, 2, 0), packet_turn(out, 2, 0, 1));
+    out->error = f8_add(f8_mul(longest, f8_all(p->side_error)), f8_all(0x1p-100f));
+    out->lanes = ebpo_face_block_lanes(&b);
+}
+
+/* Returns d . (corner x edge), relative to the ray's origin: the side of the edge on which the ray
+ * passes. */
+EBPO_EIGHT f8 packet_side(const ray_packet *p, const packet_faces *b, int i, unsigned ray)
+{
+    f8 side = f8_mul(f8_all(p->direction[0][ray]), b->turn[0][i]);
+    side = f8_add(side, f8_mul(f8_all(p->direction[1][ray]), b->turn[1][i]));
+    side = f8_add(side, f8_mul(f8_all(p->direction[2][ray]), b->turn[2][i]));
+    if (!p->apart)
+        return side;
+    f8 more = f8_mul(f8_all(p->moment[0][ray]), b->edge[0][i]);
+    more = f8_add(more, f8_mul(f8_all(p->moment[1][ray]), b->edge[1][i]));
+    more = f8_add(more, f8_mul(f8_all(p->moment[2][ray]), b->edge[2][i]));
+    return f8_add(side, more);
+}
+
+/* Tests the faces of a block with one ray, as ray_faces does. (docs/develop/bounds.md, "A packet
+ * against eight faces") */
+EBPO_EIGHT void packet_hits(const ray_packet *p, const packet_faces *b, unsigned ray, f8 bound,
+                            ray_lanes *out)
+{
+    f8 side[3], zero = f8_all(0), below = f8_sub(zero, b->error);
+    for (int i = 0; i < 3; i++)
+        side[i] = packet_side(p, b, i, ray);
+    f8 least = f8_min3(side[0], side[1], side[2]), greatest = f8_max3(side[0], side[1], side[2]);
+    unsigned alive =
+        ~f8_bits(f8_and(f8_less(least, below), f8_less(b->error, greatest))) & b->lanes;
+    out->alive = alive;
+    if (!alive)
+        return;
+    f8 leaves = f8_less(b->error, least), enters = f8_less(greatest, below),
+       in = f8_or(leaves, enters);
+    out->front = f8_bits(enters);
+    out->back = f8_bits(leaves);
+    if (p->g->facing)
+        alive &= ~(p->g->facing > 0 ? out->back : out->front);
+    f8 per_step = f8_all(p->inverse[p->axis][ray]), shift = f8_all(p->shift[p->axis][ray]),
+       size = f8_all(p->t_errors[ray]);
+    const f8 *z = b->corner[p->axis];
+    f8 least_z = f8_min3(z[0], z[1], z[2]), greatest_z = f8_max3(z[0], z[1], z[2]);
+    f8 inverse = f8_div(f8_all(1), f8_add(side[0], f8_add(side[1], side[2])));
+    f8 sum = f8_add(f8_mul(side[1], z[0]), f8_add(f8_mul(side[2], z[1]), f8_mul(side[0], z[2])));
+    f8 t = f8_mul(f8_sub(f8_mul(sum, inverse), shift), per_step);
+    f8 share = f8_min(f8_abs(f8_mul(f8_mul(b->error, f8_all(6)), inverse)), f8_all(1));
+    f8 error = f8_add(f8_mul(f8_mul(f8_sub(greatest_z, least_z), share), f8_abs(per_step)), size);
+    f8 t0 = f8_mul(f8_sub(least_z, shift), per_step),
+       t1 = f8_mul(f8_sub(greatest_z, shift), per_step);
+    f8 from = f8_pick(in, f8_sub(t, error), f8_sub(f8_min(t0, t1), size)),
+       to = f8_pick(in, f8_add(t, error), f8_add(f8_max(t0, t1), size));
+    alive &= ~f8_bits(f8_or(f8_less(bound, from), f8_less(to, zero)));
+    /* Beyond t_max, the hit has no result, but lowers the bound: all farther hits have none. */
+    out->sure = alive & f8_bits(f8_and(in, f8_at_most(zero, from)));
+    out->alive = alive;
+    f8_store(out->low, from);
+    f8_store(out->high, to);
+}
+
+/* Drops candidates of ray i of the packet that are beyond `bound`. */
+static void packet_drop_beyond(ray_packet *p, unsigned i, float bound)
+{
+    ebpo_ray_few *few = &p->g->few[p->first + i];
+    unsigned kept = 0;
+    for (unsigned k = 0; k < few->count; k++)
+        if (!(few->waiting[k].low > bound))
+            few->waiting[kept++] = few->waiting[k];
+    few->count = kept;
+}
+
+/* Tests all candidates of ray i of the packet. Returns the new bound. */
+static float packet_judge(ray_packet *p, unsigned i, float bound)
+{
+    ebpo_ray_few *few = &p->g->few[p->first + i];
+    ebpo_ray_search *r = packet_search(p, i);
+    memcpy(r->waiting, few->waiting, few->count * sizeof *few->waiting);
+    r->count = (int)few->count;
+    r->bound = bound < r->bound ? bound : r->bound;
+    r->judge(r);
+    few->count = 0;
+    return r->bound;
+}
+
+/* Adds a ray's possible hits in a block to its candidates. Returns the ray's bound, which certain
+ * hits lower. */
+EBPO_EIGHT float packet_keep(ray_packet *p, unsigned i, uint32_t block, const ray_lanes *found,
+                             float bound)
+{
+    ebpo_ray_few *few = &p->g->few[p->first + i];
+    for (unsigned lanes = found->alive; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        int facing = (int)(found->front >> lane & 1) - (int)(found->back >> lane & 1);
+        if (few->count == EBPO_RAY_FEW)
+            packet_drop_beyond(p, i, bound);
+        if (few->count == EBPO_RAY_FEW)
+            bound = packet_judge(p, i, bound);
+        few->waiting[few->count++] =
+            (ebpo_ray_candidate){ found->low[lane], block * EBPO_BLOCK + lane, facing };
+        if (found->sure >> lane & 1 && found->high[lane] < bound)
+            bound = found->high[lane];
+    }
+    return bound;
+}
+
+/* Visits a block with the rays that may intersect its box. */
+static void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block, unsigned rays)
+{
+    packet_faces faces;
+    f8 bounds = f8_load(p->bounds);
+    packet_set_block(p, s, block, &faces);
     for (; rays; rays &= rays - 1) {
         unsigned i = (unsigned)__builtin_ctz(rays);
-        ebpo_ray_search *r = packet_search(p, i);
-        for (int k = 0; k < 3 && !wide; k++)
-            ray_relative(r, k, read.axis[k], relative.axis[k]);
-        ray_block(r, block, wide ? NULL : &relative, wide);
-        bounds = packet_with_bound(bounds, i, r->bound);
+        ray_lanes found;
+        packet_hits(p, &faces, i, f8_all(p->bounds[i]), &found);
+        if (found.alive)
+            bounds = packet_with_bound(bounds, i, packet_keep(p, i, block, &found, p->bounds[i]));
     }
     packet_set_bounds(p, bounds);
 }
 
 /* Walks with one ray through a child that no other ray enters. `stack`: the free part of the
  * packet's stack, which has space for the levels below the child. */
-EBPO_EIGHT void packet_single(ray_packet *p, uint32_t child, ebpo_visit *stack, unsigned ray)
+static void packet_single(ray_packet *p, const ebpo_accel *s, uint32_t begin, ebpo_visit *stack,
+                          unsigned ray)
 {
-    ebpo_ray_search *r = packet_search(p, ray);
-    ray_walk_from(r, child, stack);
-    packet_set_bounds(p, packet_with_bound(f8_load(p->bounds), ray, r->bound));
-}
-
-/* Pushes the children `lanes` of a node, farthest first. In place of the child, a visit has the
- * node's index times 8 plus the lane, because a visit needs the child's box. (There are fewer nodes
- * than blocks, at most EBPO_BLOCKS_MAX.) */
-EBPO_EIGHT uint32_t packet_push(const ebpo_accel *s, ebpo_visit *stack, uint32_t top, uint32_t node,
-                                unsigned lanes, f8 enter, bool wide)
-{
-    uint32_t base = top;
-    float key[8];
-    f8_store(key, enter);
-    for (; lanes; lanes &= lanes - 1) {
-        unsigned lane = (unsigned)__builtin_ctz(lanes);
-        ebpo_visit v = ebpo_visit_make(key[lane], node * 8 + lane);
-        uint32_t at = top++;
-        ray_fetch(s, s->bound[node].child[lane], wide);
-        for (; at > base && stack[at - 1] < v; at--)
-            stack[at] = stack[at - 1];
-        stack[at] = v;
+    ebpo_ray_search r; /* only the fields for tests of boxes */
+    uint32_t top = 1;
+    r.near_from[3] = r.far_from[3] = r.inverse[3] = r.step_inverse[0] = 0; /* not used */
+    for (int k = 0; k < 3; k++) {
+        r.near_from[k] = p->from_near[k][ray];
+        r.far_from[k] = p->from_far[k][ray];
+        r.inverse[k] = r.step_inverse[k + 1] = p->inverse[k][ray];
     }
-    return top;
-}
-
-/* Walks through the accel with all rays. */
-EBPO_EIGHT void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack, bool wide)
-{
-    f8 enter;
-    unsigned lanes = packet_children(p, &s->bound[s->root_bound], &enter);
-    uint32_t top = packet_push(s, stack, 0, s->root_bound, lanes, enter, wide);
+    r.side_at = p->bundle.side_at;
+    stack[0] = ebpo_visit_make(0, begin);
     while (top) {
         ebpo_visit v = stack[--top];
-        uint32_t node = (uint32_t)v / 8;
-        unsigned lane = (uint32_t)v % 8;
-        if (ebpo_visit_key(v) > p->bound)
+        uint32_t child = (uint32_t)v;
+        r.bound = p->bounds[ray];
+        if (ebpo_visit_key(v) > r.bound)
             continue;
-        unsigned rays = packet_rays(p, &s->bound[node], lane);
-        uint32_t child = s->bound[node].child[lane];
+        if (child & EBPO_IS_BLOCK) {
+            packet_block(p, s, child & ~EBPO_IS_BLOCK, 1u << ray);
+            continue;
+        }
+        f8 enter;
+        float key[8];
+        const ebpo_bound *b = &s->bound[child];
+        unsigned lanes = ray_children(&r, b, &enter);
+        f8_store(key, enter);
+        uint32_t before = top;
+        top = ebpo_visit_push(stack, top, b, lanes, key);
+        for (uint32_t i = before; i < top; i++)
+            ray_fetch(s, (uint32_t)stack[i], s->wide);
+    }
+}
+
+/* Visits a node: pushes the children that a ray of the packet may enter, farthest first. Returns
+ * the new top of the stack. */
+EBPO_EIGHT uint32_t packet_node(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack, uint32_t top,
+                                uint32_t node)
+{
+    const ebpo_bound *b = &s->bound[node];
+    bundle_sides sides;
+    f8 bundle_enter, enter[8];
+    uint32_t rays[8];
+    float key[8];
+    unsigned found = 0;
+    for (unsigned lanes = bundle_children(&p->bundle, b, &sides, &bundle_enter); lanes;
+         lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes);
+        rays[lane] = packet_rays(p, &sides, lane, &enter[lane]);
+        found |= (unsigned)(rays[lane] != 0) << lane;
+    }
+    f8_store(key, bundle_enter);
+    for (unsigned lanes = found; lanes; lanes &= lanes - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(lanes), before = (1u << lane) - 1;
+        /* the children that are farther, and earlier children that are as far, are below */
+        f8 own = f8_all(key[lane]);
+        unsigned below = (f8_bits(f8_less(own, bundle_enter)) |
+                          (f8_bits(f8_at_most(own, bundle_enter)) & before)) &
+                         found;
+        uint32_t at = top + (uint32_t)__builtin_popcount(below);
+        ray_fetch(s, b->child[lane], s->wide);
+        stack[at] = (ebpo_visit)rays[lane] << 32 | b->child[lane];
+        f8_store(p->g->enter[at], enter[lane]);
+    }
+    return top + (uint32_t)__builtin_popcount(found);
+}
+
+/* Walks through the accel with all rays. A visit on the stack has a bit for each ray that may enter
+ * the child's box in place of the key; g->enter has the rays' keys. */
+static void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack)
+{
+    uint32_t top = packet_node(p, s, stack, 0, s->root_bound);
+    while (top) {
+        ebpo_visit v = stack[--top];
+        uint32_t child = (uint32_t)v;
+        unsigned rays = (unsigned)(v >> 32) &
+                        f8_bits(f8_at_most(f8_load(p->g->enter[top]), f8_load(p->bounds)));
         if (!rays)
             continue;
-        if (!(rays & (rays - 1))) {
-            packet_single(p, child, stack + top, (unsigned)__builtin_ctz(rays));
-        } else if (child & EBPO_IS_BLOCK) {
-            packet_block(p, s, child & ~EBPO_IS_BLOCK, rays, wide);
-        } else {
-            lanes = packet_children(p, &s->bound[child], &enter);
-            top = packet_push(s, stack, top, child, lanes, enter, wide);
-        }
+        if (child & EBPO_IS_BLOCK)
+            packet_block(p, s, child & ~EBPO_IS_BLOCK, rays);
+        else if (rays & (rays - 1))
+            top = packet_node(p, s, stack, top, child);
+        else
+            packet_single(p, s, child, stack + top, (unsigned)__builtin_ctz(rays));
     }
-    for (unsigned i = 0; i < p->count; i++)
-        if (p->search[i])
-            drop_beyond(p->search[i]);
+    for (unsigned i = 0; i < p->count; i++) {
+        ebpo_ray_few *few = &p->g->few[p->first + i];
+        packet_drop_beyond(p, i, p->bounds[i]);
+        if (!p->search[i])
+            continue;
+        memcpy(p->search[i]->waiting, few->waiting, few->count * sizeof *few->waiting);
+        p->search[i]->count = (int)few->count;
+        few->count = 0;
+    }
 }
 
 /* --- turns: several rays walked in turns --- */
@@ -731,6 +1084,7 @@ EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
         v4d t = { ray[0]->t_max, ray[1]->t_max, ray[2]->t_max, ray[3]->t_max };
         bound[h] = v4d_min(t * s->scale * (1 + 0x1p-20) + 0x1p-90, beyond);
     }
+    memcpy(f->from, p->g->ray[p->first]->origin, sizeof f->from);
     f8 bounds = f8_from_doubles(bound[0], bound[1]);
     packet_set_bounds(p, f8_pick(f8_mask((1u << p->count) - 1), bounds, f8_all(-1)));
     double farthest = v4d_greatest(far);
@@ -751,6 +1105,8 @@ static void packet_read_begun(ray_packet *p, packet_frame *f)
         const ebpo_ray_search *r = i < p->count ? p->search[i] : NULL;
         bounds = r ? packet_with_bound(bounds, i, r->bound) : bounds;
         r = r ? r : any;
+        if (i == 0 && r)
+            memcpy(f->from, r->from, sizeof f->from);
         for (int k = 0; k < 3 && r; k++) {
             f->origin[k][i / 4][i % 4] = r->origin[k];
             f->direction[k][i / 4][i % 4] = r->direction[k];
@@ -765,16 +1121,13 @@ static void packet_read_begun(ray_packet *p, packet_frame *f)
 static void ray_walk_packet(ray_packet *p, ebpo_ray_search **other, unsigned *others)
 {
     const ebpo_accel *s = p->g->s;
-    packet_frame f;
     if (p->count > 1 && p->g->wants == EBPO_WANTS_FIRST && !(s->root_bound & EBPO_IS_BLOCK)) {
-        if (!packet_read(p, &f))
-            packet_read_begun(p, &f);
-        if (packet_is_coherent(&f, s)) {
-            packet_set(p, &f);
-            if (s->wide)
-                packet_walk(p, s, p->g->stack[0], true);
-            else
-                packet_walk(p, s, p->g->stack[0], false);
+        if (!packet_read(p, &p->frame))
+            packet_read_begun(p, &p->frame);
+        if (packet_is_coherent(&p->frame, s)) {
+            packet_set(p);
+            packet_set_faces(p, s);
+            packet_walk(p, s, p->g->stack[0]);
             return;
         }
     }
@@ -788,6 +1141,8 @@ static void ray_walk_many(ebpo_ray_group *g)
     ebpo_ray_search *other[EBPO_RAY_GROUP];
     unsigned others = 0;
     bool wide = g->s->wide, sorted = g->wants == EBPO_WANTS_FIRST;
+    for (unsigned i = 0; i < g->count; i++)
+        g->few[i].count = 0;
     for (unsigned i = 0; i < g->count && g->s->bound_count; i += EBPO_RAY_PACKET) {
         ray_packet p;
         p.g = g;
@@ -806,4 +1161,4 @@ static void ray_walk_many(ebpo_ray_group *g)
         ray_walk_in_turns(other, others, g, false, false);
 }
 
-const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };
+const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many, ray_misses };

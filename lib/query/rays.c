@@ -432,13 +432,19 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     r->limit = c->limit;
 }
 
+/* Returns the value of ebpo_ray_search.facing. */
+static int facing_of(ebpo_ray_sides sides)
+{
+    return sides == EBPO_RAY_BOTH ? 0 : sides == EBPO_RAY_FRONT ? 1 : -1;
+}
+
 /* Prepares the search of the faces of a subtree or of the whole model. Returns false if the ray
  * misses all faces. */
 static bool begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
 {
     r->ray = &c->ray;
     r->wants = c->wants;
-    r->facing = c->sides == EBPO_RAY_BOTH ? 0 : c->sides == EBPO_RAY_FRONT ? 1 : -1;
+    r->facing = facing_of(c->sides);
     r->limit = c->limit;
     r->decide = decide_face;
     r->user = c;
@@ -663,14 +669,27 @@ static void begin_ray(batch *b, uint64_t i, unsigned worker, casting *c)
                   b->options.sides);
 }
 
+/* The result of a ray without a hit. */
+static const ebpo_ray_hit no_hit = { INFINITY, EBPO_NO_FACE, 0 };
+
+/* Stores the first hit of ray i. */
+static void store_first(batch *b, uint64_t i, ebpo_ray_hit hit)
+{
+    b->first[i] = hit;
+    if (b->options.done)
+        b->options.done[i] = true;
+}
+
 /* Stores the result of ray i. */
 static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *c,
                                 ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
-    if (b->wants == EBPO_WANTS_FIRST)
-        b->first[i] = c->count ? hit_of(&c->first) : (ebpo_ray_hit){ INFINITY, EBPO_NO_FACE, 0 };
-    else if (b->wants == EBPO_WANTS_ANY)
+    if (b->wants == EBPO_WANTS_FIRST) {
+        store_first(b, i, c->count ? hit_of(&c->first) : no_hit);
+        return EBPO_OK;
+    }
+    if (b->wants == EBPO_WANTS_ANY)
         b->any[i] = c->count;
     else {
         found f = { .worker = worker, .begin = b->hit_count[worker] };
@@ -681,6 +700,18 @@ static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *
     if (status == EBPO_OK && b->options.done)
         b->options.done[i] = true;
     return status;
+}
+
+/* Stores the result of ray i, which has no hit. */
+static ebpo_status store_miss(batch *b, uint64_t i, unsigned worker, ebpo_error *error)
+{
+    if (b->wants == EBPO_WANTS_FIRST) {
+        store_first(b, i, no_hit);
+        return EBPO_OK;
+    }
+    casting none;
+    begin_ray(b, i, worker, &none);
+    return store_result(b, i, worker, &none, error);
 }
 
 /* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
@@ -730,26 +761,124 @@ static void add_to_group(group *g, uint64_t ray)
     g->begun[i] = NULL;
 }
 
+/* Returns the candidates of ray i of a group after walk_many. *count: their number. */
+static const ebpo_ray_candidate *candidates_of(const group *g, unsigned i, unsigned *count)
+{
+    const ebpo_ray_few *few = &g->rays.few[i];
+    *count = g->begun[i] ? (unsigned)g->begun[i]->count : few->count;
+    return g->begun[i] ? g->begun[i]->waiting : few->waiting;
+}
+
+/* Tests the candidates of ray i of a group, and stores the result. */
+static ebpo_status end_ray(group *g, unsigned i, ebpo_error *error)
+{
+    const ebpo_ray_few *few = &g->rays.few[i];
+    casting *c = &g->c[i];
+    ebpo_ray_search *r = g->begun[i];
+    if (!r && few->count && (r = begin_of_group(g, i))) {
+        memcpy(r->waiting, few->waiting, few->count * sizeof *few->waiting);
+        r->count = (int)few->count;
+    }
+    if (r)
+        end_search(r);
+    else
+        begin_ray(g->b, g->index[i], g->worker, c);
+    ebpo_status status = ray_end(c, EBPO_OK, error);
+    return status == EBPO_OK ? store_result(g->b, g->index[i], g->worker, c, error) : status;
+}
+
+/* Up to four rays of a group that have one candidate each, through whose interior the ray's line
+ * certainly goes. */
+typedef struct four {
+    unsigned count, ray[4];
+    ebpo_ray_candidate candidate[4];
+} four;
+
+/* Finds the first hits of four rays. */
+static ebpo_status end_four(group *g, four *f, ebpo_error *error)
+{
+    const ebpo_accel *s = g->rays.s;
+    ebpo_status status = EBPO_OK;
+    ebpo_ray_four in;
+    double t[4];
+    for (unsigned i = 0; i < 4; i++) {
+        unsigned lane = i < f->count ? i : 0;
+        const ebpo_ray *ray = g->rays.ray[f->ray[lane]];
+        double triangle[3][3];
+        ebpo_accel_triangle(s, f->candidate[lane].slot, triangle);
+        for (int k = 0; k < 3; k++) {
+            in.origin[k][i] = ray->origin[k];
+            in.direction[k][i] = ray->direction[k];
+            for (int corner = 0; corner < 3; corner++)
+                in.triangle[corner][k][i] = triangle[corner][k];
+        }
+        in.t_max[i] = ray->t_max;
+        in.facing[i] = f->candidate[lane].facing;
+    }
+    unsigned done = ebpo_ray_interior_four(&in, t);
+    for (unsigned i = 0; i < f->count && status == EBPO_OK; i++) {
+        uint64_t face = ebpo_accel_source_face(s, ebpo_accel_slot_face(s, f->candidate[i].slot));
+        if (done >> i & 1)
+            store_first(g->b, g->index[f->ray[i]], (ebpo_ray_hit){ t[i], face, in.facing[i] });
+        else
+            status = end_ray(g, f->ray[i], error);
+    }
+    f->count = 0;
+    return status;
+}
+
 /* Finds the hits of a group of one or more rays. Results are those of cast_one. */
 static ebpo_status cast_group(group *g, ebpo_error *error)
 {
     const ebpo_accel *s = g->rays.s;
+    const ebpo_model *m = g->b->context[g->worker]->model;
+    four f = { .count = 0 };
+    unsigned count;
     ebpo_status status = EBPO_OK;
-    g->b->context[g->worker]->model->kernels.ray->walk_many(&g->rays);
+    m->kernels.ray->walk_many(&g->rays);
     /* Prefetches what the exact tests of candidates will read. (gcc omits calls of a separate
      * function, as it has no result.) */
-    for (unsigned i = 0; i < g->rays.count; i++)
-        for (int k = 0; g->begun[i] && k < g->begun[i]->count; k++)
-            ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, g->begun[i]->waiting[k].slot));
+    for (unsigned i = 0; i < g->rays.count; i++) {
+        const ebpo_ray_candidate *c = candidates_of(g, i, &count);
+        for (unsigned k = 0; k < count; k++)
+            ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, c[k].slot));
+    }
     for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
-        casting *c = &g->c[i];
-        if (g->begun[i])
-            end_search(g->begun[i]);
-        else
-            begin_ray(g->b, g->index[i], g->worker, c);
-        status = ray_end(c, EBPO_OK, error);
-        if (status == EBPO_OK)
-            status = store_result(g->b, g->index[i], g->worker, c, error);
+        const ebpo_ray_candidate *c = candidates_of(g, i, &count);
+        bool decided = g->begun[i] && (g->c[i].count || g->c[i].done);
+        if (count == 1 && c->facing && g->rays.wants == EBPO_WANTS_FIRST && !decided &&
+            !m->info->pruned) {
+            f.candidate[f.count] = *c;
+            f.ray[f.count++] = i;
+            status = f.count == 4 ? end_four(g, &f, error) : EBPO_OK;
+        } else if (count == 0 && !g->begun[i] && !m->info->pruned) {
+            status = store_miss(g->b, g->index[i], g->worker, error);
+        } else {
+            status = end_ray(g, i, error);
+        }
+    }
+    return status == EBPO_OK && f.count ? end_four(g, &f, error) : status;
+}
+
+/* Finds the hits of the rays begin .. end - 1, in groups. */
+static ebpo_status cast_part(group *g, uint64_t begin, uint64_t end, ebpo_error *error)
+{
+    const batch *b = g->b;
+    const ebpo_model *m = b->context[g->worker]->model;
+    ebpo_status status = EBPO_OK;
+    /* In a subset, rays that miss all faces may come through pruned nodes. */
+    bool miss = end - begin > 1 && !b->options.done && !m->info->pruned &&
+                m->kernels.ray->misses(m->whole, b->rays + begin, (unsigned)(end - begin));
+    for (uint64_t i = begin; i < end && miss && status == EBPO_OK; i++)
+        status = store_miss(g->b, i, g->worker, error);
+    if (miss)
+        return status;
+    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
+        g->rays.count = 0;
+        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
+            if (!b->options.done || !b->options.done[i])
+                add_to_group(g, i);
+        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
     }
     return status;
 }
@@ -765,18 +894,14 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
     g->worker = worker;
     g->rays.s = b->context[worker]->model->whole;
     g->rays.wants = b->wants;
+    g->rays.facing = facing_of(b->options.sides);
     g->rays.begin = begin_of_group;
     g->rays.user = g;
     memset(g->found, 0, sizeof g->found);
     memset(g->capacity, 0, sizeof g->capacity);
     ebpo_status status = EBPO_OK;
-    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
-        g->rays.count = 0;
-        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
-            if (!b->options.done || !b->options.done[i])
-                add_to_group(g, i);
-        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
-    }
+    for (uint64_t i = begin; i < end && status == EBPO_OK; i += EBPO_RAY_BUNDLE)
+        status = cast_part(g, i, end - i < EBPO_RAY_BUNDLE ? end : i + EBPO_RAY_BUNDLE, error);
     for (unsigned i = 0; i < EBPO_RAY_GROUP; i++)
         free(g->found[i]);
     free(g);
