@@ -44,7 +44,7 @@
 
 enum {
     LEAST_FACES = 2048,   /* a model with fewer faces has no patches */
-    MOST_FACES = 8192,    /* a node with more faces has patches below it */
+    MOST_FACES = 32768,   /* a node with more faces has patches below it */
     TASK_FACES = 1 << 18, /* greatest number of faces of a parallel task */
     /* number of triangles before simplification, divided by the number afterwards */
     REDUCTION = 4,
@@ -631,7 +631,10 @@ static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const
                              : ebpo_fail_memory(error, mesh->vertex_count * sizeof *normal);
     for (uint64_t v = 0; v < mesh->vertex_count && status == EBPO_OK; v++) {
         const ebpo_patch_vertex *from = &mesh->vertex[v];
-        memcpy(normal[v], from->normal, sizeof normal[v]);
+        /* Neighbouring patches need equal normals at their border. The mean of the patch's
+         * triangles is nearly as good elsewhere. */
+        for (int k = 0; k < 3; k++)
+            normal[v][k] = from->fixed ? from->normal[k] : 0;
         for (int k = 0; k < 3 && colour; k++)
             colour[3 * v + (uint64_t)k] =
                 (uint8_t)fmin(255, floor(from->colour[k] / from->weight + 0.5));
