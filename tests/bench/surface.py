@@ -7,9 +7,12 @@ docs/measured/coarse-levels.md.
 Converts each mesh with the part surface. Draws the mesh, the levels of the surface and the levels of envelopes by
 `ebpo render` from one viewpoint. Prints the SSIM of luminance over the pixels that show the model, and the size of
 the file that `ebpo subset` writes for the level. Also prints the part's share of the file, and the processor time of
-the conversion with and without the part. The last table has the bytes of the surface / those of envelopes at equal
-SSIM: at the SSIM of levels of the surface, and at that of levels of envelopes. The bytes of the other way are
-interpolated between its levels; those of its coarsest level are the least. "-": the other way does not reach the SSIM.
+the conversion with and without the part.
+
+The last table has the bytes of the surface / those of envelopes at equal SSIM: at levels of the surface, and at levels
+of envelopes, where the bytes of the other way are interpolated between its levels. Levels whose SSIM the other way does
+not reach have no share. If all envelopes have a greater SSIM, the coarsest count. "below": the coarsest level of the
+surface / coarser envelopes, whose SSIM is lower.
 
 Needs numpy.
 """
@@ -112,35 +115,39 @@ def draw(ebpo, file, words, level, folder, pixels):
 
 
 def bytes_at(levels, wanted):
-    """Return the bytes at which a way reaches an SSIM, or None. levels: (bytes, SSIM), coarse to fine."""
-    least, before = levels[0]
-    if before >= wanted:
-        return least
-    for size, found in levels[1:]:
-        if found >= wanted:
-            return least + (size - least) * (wanted - before) / (found - before)
-        least, before = size, found
+    """Return the bytes at which a way has an SSIM, or None. levels: (bytes, SSIM), coarse to fine."""
+    for (least, before), (size, found) in zip(levels, levels[1:]):
+        if before <= wanted <= found:
+            return least + (size - least) * (wanted - before) / ((found - before) or 1)
     return None
 
 
 def shares(levels):
-    """Return bytes of the surface / bytes of envelopes at the SSIM of levels, a list for each way."""
+    """Return bytes of the surface / bytes of envelopes at the SSIM of levels of the surface, at that of envelopes, and
+    at the SSIM of envelopes below that of the coarsest level of the surface, where its bytes are those of this level.
+    """
     surface, envelopes = levels["surface"], levels["envelopes"]
-    at_surface = [(size, bytes_at(envelopes, found)) for size, found in surface]
-    at_envelopes = [(bytes_at(surface, found), size) for size, found in envelopes]
-    return [[(a / b if a and b else None) for a, b in pairs] for pairs in (at_surface, at_envelopes)]
+    at_surface = [(size, envelopes[0][0] if found < envelopes[0][1] else bytes_at(envelopes, found))
+                  for size, found in surface]
+    at_envelopes = [(bytes_at(surface, found), size) for size, found in envelopes if found >= surface[0][1]]
+    below = [(surface[0][0], size) for size, found in envelopes if found < surface[0][1]]
+    return [[a / b for a, b in pairs if a and b] for pairs in (at_surface, at_envelopes, below)]
 
 
 def print_shares(rows):
-    """Print the models with the greatest share first. A share of which envelopes do not reach the SSIM is no share."""
-    def text(values):
-        return " ".join("-" if v is None else f"{v:.2f}" for v in values)
+    """Print the rows of measure() as a table, the greatest share first."""
+    def greatest(row):
+        return max(row[4][0] + row[4][1], default=0)
 
-    print("\n| model | faces | part, % of the file | time | at the levels of the surface | at those of envelopes | greatest "
-          f"| {GOAL:.2f} |\n|---|---|---|---|---|---|---|---|")
-    for name, faces, part, time, both in sorted(rows, key=lambda r: -max(v or 0 for v in r[4][0] + r[4][1])):
-        most = max(v or 0 for v in both[0] + both[1])
-        print(f"| {name} | {faces} | {100 * part:.1f} | {time:.2f} | {text(both[0])} | {text(both[1])} | {most:.2f} | "
+    def text(values):
+        return " ".join(f"{v:.2f}" for v in values)
+
+    print("\n| model | faces | part, % of the file | time | at levels of the surface | at levels of envelopes | below "
+          f"| greatest | {GOAL:.2f} |\n|---|---|---|---|---|---|---|---|---|")
+    for row in sorted(rows, key=greatest, reverse=True):
+        name, faces, part, time, both = row
+        most = greatest(row)
+        print(f"| {name} | {faces} | {100 * part:.1f} | {time:.2f} | {' | '.join(map(text, both))} | {most:.2f} | "
               f"{'met' if most <= GOAL else 'missed'} |")
 
 
