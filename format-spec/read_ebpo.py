@@ -697,7 +697,7 @@ def check_border(file):
 
 def patch_triangles(code, count, vertices):
     """surface.md, section 3: the triangles, and (a, b, beyond) of each vertex that became new at an edge, else None."""
-    edges, recent, origin, out, at = [], [], [], [], 0
+    edges, begins, origin, out, at = [], {}, [], [], 0
 
     def number():
         nonlocal at
@@ -714,32 +714,63 @@ def patch_triangles(code, count, vertices):
         origin.append(of)
         return len(origin) - 1
 
-    for _ in range(count):
-        e, v = divmod(code[at], 16)
-        at += 1
-        if e == 15:
-            assert v == 0, "a free triangle of a patch"
+    def add(a, b, beyond):
+        edges.append({"from": a, "to": b, "beyond": beyond, "left": None, "right": None, "open": True})
+        begins[a] = edges[-1]
+        return edges[-1]
+
+    def join(p, q):
+        if p:
+            p["right"] = q
+        if q:
+            q["left"] = p
+
+    while len(out) < count:
+        while edges and not edges[-1]["open"]:
+            edges.pop()
+        if not edges:
             corners = []
             for _ in range(3):
                 back = number()
                 assert back <= len(origin), "a vertex of a patch"
                 corners.append(len(origin) - back if back else new(None))
-                recent = [corners[-1]] + recent[:13]
             a, b, c = corners
-            edges = ([(b, a, c)] + edges)[:15]
-        else:
-            a, b, beyond = edges.pop(e)
-            if v == 0:
-                c = new((a, b, beyond))
-            elif v == 15:
-                c = len(origin) - 1 - number()
-                assert c >= 0, "a vertex of a patch"
-            else:
-                c = recent[v - 1]
-            if v in (0, 15):
-                recent = [c] + recent[:13]
-        edges = ([(c, b, a), (a, c, b)] + edges)[:15]
+            ring = [add(b, a, c), add(a, c, b), add(c, b, a)]
+            for k in range(3):
+                join(ring[k - 1], ring[k])
+            out.append((a, b, c))
+            continue
+        edge, byte = edges.pop(), code[at]
+        edge["open"] = False
+        a, b, l, r = edge["from"], edge["to"], edge["left"], edge["right"]
+        at += 1
+        if byte == 3:
+            join(l, None)
+            join(None, r)
+            continue
+        assert byte < 5 and (byte != 1 or l) and (byte != 2 or r), "a byte of a patch"
+        c = new((a, b, edge["beyond"])) if byte == 0 else l["from"] if byte == 1 else r["to"] if byte == 2 else \
+            len(origin) - 1 - number()
+        assert c >= 0 and c not in (a, b), "a vertex of a patch"
         out.append((a, b, c))
+        before = begins.get(c)
+        of_l, of_r = bool(l) and l["from"] == c, bool(r) and r["to"] == c
+        if of_l:
+            l["open"], l = False, l["left"]
+        if of_r:
+            r["open"], r = False, r["right"]
+        if of_l and of_r:
+            join(l, r)
+            continue
+        first = None if of_l else add(a, c, b)
+        last = None if of_r else add(c, b, a)
+        join(l, first or last)
+        join(last or first, r)
+        if first and last:
+            known = before if before and before["open"] else None
+            left = known["left"] if known else first
+            join(first, known or last)
+            join(left, last)
     assert at == len(code), "bytes of a patch"
     return out, origin + [None] * (vertices - len(origin))
 

@@ -44,7 +44,8 @@
 
 enum {
     LEAST_FACES = 2048,   /* a model with fewer faces has no patches */
-    MOST_FACES = 8192,    /* a node with more faces has patches below it */
+    ROOT_FACES = 8192,    /* a model with more faces has patches below the root */
+    MOST_FACES = 32768,   /* any other node with more faces has patches below it */
     TASK_FACES = 1 << 18, /* greatest number of faces of a parallel task */
     /* number of triangles before simplification, divided by the number afterwards */
     REDUCTION = 4,
@@ -150,7 +151,7 @@ static uint64_t list_nodes(surface_builder *b, ebpo_cell cell, uint64_t first)
             add_node(b, child, from, end);
     }
     b->node[self].end = end;
-    if (end - first <= MOST_FACES || cell.level == EBPO_PATCH_LEVEL)
+    if (end - first <= (cell.level ? MOST_FACES : ROOT_FACES) || cell.level == EBPO_PATCH_LEVEL)
         b->count = end > first ? self + 1 : self;
     b->node[self].after = b->count;
     return end;
@@ -631,7 +632,10 @@ static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const
                              : ebpo_fail_memory(error, mesh->vertex_count * sizeof *normal);
     for (uint64_t v = 0; v < mesh->vertex_count && status == EBPO_OK; v++) {
         const ebpo_patch_vertex *from = &mesh->vertex[v];
-        memcpy(normal[v], from->normal, sizeof normal[v]);
+        /* Neighbouring patches need equal normals at their border. The mean of the patch's
+         * triangles is nearly as good elsewhere. */
+        for (int k = 0; k < 3; k++)
+            normal[v][k] = from->fixed ? from->normal[k] : 0;
         for (int k = 0; k < 3 && colour; k++)
             colour[3 * v + (uint64_t)k] =
                 (uint8_t)fmin(255, floor(from->colour[k] / from->weight + 0.5));

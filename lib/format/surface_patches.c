@@ -1,12 +1,12 @@
 /* Encodes, decodes, reads and checks patches of the simplified surface. A patch is a list of
  * triangles, which replaces the faces of one node.
  *
- * Most triangles share an edge with a recent triangle. The coder and the decoder keep the last
- * edges and the last vertices; a byte of the code names an edge and the third vertex of a triangle.
- * Vertices are numbered in the order in which the triangles use them first. The position of a
- * vertex is stored as the difference from a prediction: the fourth corner of a parallelogram. The
- * other three corners are the vertices of the triangle on the other side of the edge. Source:
- * format-spec/surface.md. */
+ * Most triangles are reached over an open edge: an edge of an earlier triangle to which the
+ * neighbouring triangle is not yet known. A byte of the code states the third vertex. It is often
+ * new, or the other end of an open edge beside the first. Vertices are numbered in the order in
+ * which the triangles use them first. The position of a vertex is stored as the difference from a
+ * prediction: the fourth corner of a parallelogram. The other three corners are the vertices of the
+ * triangle on the other side of the edge. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -20,61 +20,135 @@
 #include "core/hash.h"
 #include "format/reader.h"
 #include "format/surface_patches.h"
+#include "geometry/vec3.h"
 
 #define NONE UINT32_MAX
 
-/* A byte of code has a recent edge in its higher half, and a vertex in its lower half. */
+/* A byte of code: the third vertex of the triangle at the last open edge. */
 enum {
-    EDGES = 15,         /* maximum number of recent edges */
-    VERTICES = 14,      /* maximum number of recent vertices; the lower half k + 1 names vertex k */
-    FREE_TRIANGLE = 15, /* higher half: a triangle without a recent edge; three numbers follow */
-    NEW_VERTEX = 0,     /* lower half: a vertex that no triangle has used */
-    FAR_VERTEX = 15     /* lower half: a vertex that is not recent; its number follows */
+    NEW_VERTEX = 0,   /* a vertex that no triangle has used */
+    LEFT_VERTEX = 1,  /* where the open edge before begins */
+    RIGHT_VERTEX = 2, /* where the open edge after ends */
+    NO_TRIANGLE = 3,  /* there is no triangle at the edge */
+    FAR_VERTEX = 4    /* any other vertex; its number follows */
 };
 
-/* --- state of coder and decoder --- */
+/* Coordinates of a stored normal are 0 to NORMALS - 1. */
+enum { NORMAL_STEPS = 63, NORMALS = 2 * NORMAL_STEPS + 1 };
+
+/* --- state of encoder and decoder --- */
 
 /* An edge, in the direction in which the next triangle at this edge uses it. */
-typedef struct recent_edge {
+typedef struct open_edge {
     uint32_t from, to, beyond; /* beyond: third vertex of the triangle that has the edge */
-} recent_edge;
+    /* indices of the open edges that end at `from` and begin at `to` on the border of the triangles
+     * so far; NONE: unknown */
+    uint32_t before, after;
+    bool open; /* false: removed; the element stays until it is the last one */
+} open_edge;
 
-/* Recent edges and vertices. After each triangle, they are equal in the encoder and the decoder. */
-typedef struct recent {
-    recent_edge edge[EDGES];   /* the last edge first */
-    uint32_t vertex[VERTICES]; /* the last vertex first */
-    unsigned edges, vertices;
-} recent;
+/* The open edges. After each triangle, they are equal in the encoder and the decoder. */
+typedef struct open_edges {
+    open_edge *edge; /* [triangles + 3] */
+    uint32_t count;
+    uint32_t *begins; /* [vertices] index of the last edge that was opened at a vertex, or NONE */
+} open_edges;
 
-static void add_edge(recent *r, uint32_t from, uint32_t to, uint32_t beyond)
+static bool make_edges(open_edges *s, uint64_t triangles, uint64_t vertices)
 {
-    r->edges += r->edges < EDGES;
-    memmove(r->edge + 1, r->edge, (r->edges - 1) * sizeof *r->edge);
-    r->edge[0] = (recent_edge){ from, to, beyond };
+    s->edge = ebpo_alloc(triangles + 3, sizeof *s->edge);
+    s->begins = ebpo_alloc(vertices, sizeof *s->begins);
+    if (s->begins)
+        memset(s->begins, 0xff, vertices * sizeof *s->begins);
+    return s->edge && s->begins;
 }
 
-static void remove_edge(recent *r, unsigned i)
+static void free_edges(open_edges *s)
 {
-    memmove(r->edge + i, r->edge + i + 1, (r->edges - i - 1) * sizeof *r->edge);
-    r->edges--;
+    free(s->edge);
+    free(s->begins);
 }
 
-static void add_vertex(recent *r, uint32_t v)
+static void link_edges(open_edges *s, uint32_t before, uint32_t after)
 {
-    r->vertices += r->vertices < VERTICES;
-    memmove(r->vertex + 1, r->vertex, (r->vertices - 1) * sizeof *r->vertex);
-    r->vertex[0] = v;
+    if (before != NONE)
+        s->edge[before].after = after;
+    if (after != NONE)
+        s->edge[after].before = before;
 }
 
-/* Adds the edges of a triangle in the direction that they have in the neighbouring triangles.
- * `with_first`: true to add also the edge from t[0] to t[1]; false if the triangle was reached over
- * this edge. */
-static void add_edges(recent *r, const uint32_t t[3], bool with_first)
+static uint32_t add_edge(open_edges *s, uint32_t from, uint32_t to, uint32_t beyond)
 {
-    if (with_first)
-        add_edge(r, t[1], t[0], t[2]);
-    add_edge(r, t[0], t[2], t[1]);
-    add_edge(r, t[2], t[1], t[0]);
+    s->edge[s->count] = (open_edge){ from, to, beyond, NONE, NONE, true };
+    return s->begins[from] = s->count++;
+}
+
+/* Removes the last open edge, which is returned in *out. Returns false if no edge is open. */
+static bool take_edge(open_edges *s, open_edge *out)
+{
+    while (s->count) {
+        *out = s->edge[--s->count];
+        if (out->open)
+            return true;
+    }
+    return false;
+}
+
+/* Adds the edges of a triangle that was reached over no open edge. */
+static void add_first_edges(open_edges *s, const uint32_t t[3])
+{
+    uint32_t x = add_edge(s, t[1], t[0], t[2]), y = add_edge(s, t[0], t[2], t[1]),
+             z = add_edge(s, t[2], t[1], t[0]);
+    link_edges(s, x, y);
+    link_edges(s, y, z);
+    link_edges(s, z, x);
+}
+
+/* Notes that the edge `e`, which was removed, has no triangle. */
+static void end_edge(open_edges *s, const open_edge *e)
+{
+    link_edges(s, e->before, NONE);
+    link_edges(s, NONE, e->after);
+}
+
+/* Adds the other edges of the triangle (e->from, e->to, v) at the removed edge `e`, or removes them
+ * if they are open on the other side. */
+static void add_edges(open_edges *s, const open_edge *e, uint32_t v)
+{
+    uint32_t begins = NONE, ends = NONE; /* edges that begin and end at v */
+    bool left = e->before != NONE && s->edge[e->before].from == v,
+         right = e->after != NONE && s->edge[e->after].to == v;
+    if (left) {
+        ends = s->edge[e->before].before;
+        s->edge[e->before].open = false;
+    }
+    if (right) {
+        begins = s->edge[e->after].after;
+        s->edge[e->after].open = false;
+    }
+    if (left && right) {
+        link_edges(s, ends, begins);
+    } else if (left) {
+        uint32_t last = add_edge(s, v, e->to, e->from);
+        link_edges(s, ends, last);
+        link_edges(s, last, e->after);
+    } else if (right) {
+        uint32_t last = add_edge(s, e->from, v, e->to);
+        link_edges(s, e->before, last);
+        link_edges(s, last, begins);
+    } else {
+        uint32_t i = s->begins[v];
+        if (i < s->count && s->edge[i].open && s->edge[i].from == v) {
+            begins = i;
+            ends = s->edge[i].before;
+        }
+        uint32_t first = add_edge(s, e->from, v, e->to), last = add_edge(s, v, e->to, e->from);
+        link_edges(s, e->before, first);
+        link_edges(s, last, e->after);
+        link_edges(s, first, begins == NONE ? last : begins);
+        if (begins != NONE)
+            link_edges(s, ends, last);
+    }
 }
 
 /* Vertices from which the position of a vertex is predicted: a + b - beyond. If `beyond` is NONE,
@@ -95,7 +169,7 @@ static void predict_point(const int16_t *point, const prediction *p, uint32_t v,
                            point[3 * p->beyond + (uint32_t)k];
 }
 
-/* Returns the vertex whose normal and colour are subtracted from the normal and colour of v. */
+/* Returns the vertex whose colour is subtracted from the colour of v. */
 static uint32_t vertex_before(const prediction *p, uint32_t v)
 {
     return p->beyond == NONE ? v - 1 : p->a;
@@ -107,7 +181,7 @@ static uint32_t vertex_before(const prediction *p, uint32_t v)
 typedef struct coder {
     const ebpo_patch_source *in;
     ebpo_patch_rows *out;
-    recent recent;
+    open_edges edges;
     /* [slots] hash table of directed edges: index in in->triangle of the corner where the edge
      * begins; NONE: a free slot */
     uint32_t *corner;
@@ -176,102 +250,108 @@ static uint32_t new_number(coder *c, uint32_t former, prediction from)
     return c->number[former] = c->next++;
 }
 
-/* Encodes a triangle at recent edge `edge`. i: corner of the triangle where this edge begins. */
-static void put_attached(coder *c, unsigned edge, uint32_t i)
+/* Encodes a triangle at the open edge `e`. i: corner of the triangle where this edge begins. */
+static void put_attached(coder *c, const open_edge *e, uint32_t i)
 {
-    recent_edge e = c->recent.edge[edge];
     uint32_t former = c->in->triangle[i - i % 3 + (i + 2) % 3], v = c->number[former];
     if (v == NONE) {
-        v = new_number(c, former, (prediction){ e.from, e.to, e.beyond });
-        put_byte(c, edge << 4 | NEW_VERTEX);
-        add_vertex(&c->recent, v);
+        v = new_number(c, former, (prediction){ e->from, e->to, e->beyond });
+        put_byte(c, NEW_VERTEX);
+    } else if (e->before != NONE && c->edges.edge[e->before].from == v) {
+        put_byte(c, LEFT_VERTEX);
+    } else if (e->after != NONE && c->edges.edge[e->after].to == v) {
+        put_byte(c, RIGHT_VERTEX);
     } else {
-        unsigned k = 0;
-        while (k < c->recent.vertices && c->recent.vertex[k] != v)
-            k++;
-        put_byte(c, edge << 4 | (k < c->recent.vertices ? k + 1 : FAR_VERTEX));
-        if (k == c->recent.vertices) {
-            put_number(c, c->next - 1 - v);
-            add_vertex(&c->recent, v);
-        }
+        put_byte(c, FAR_VERTEX);
+        put_number(c, c->next - 1 - v);
     }
-    remove_edge(&c->recent, edge);
-    add_edges(&c->recent, (uint32_t[3]){ e.from, e.to, v }, false);
+    add_edges(&c->edges, e, v);
 }
 
-/* Encodes a triangle that has no recent edge. */
+/* Encodes a triangle when no edge is open. */
 static void put_free(coder *c, uint64_t triangle)
 {
     uint32_t t[3];
-    put_byte(c, FREE_TRIANGLE << 4);
     for (int k = 0; k < 3; k++) {
         uint32_t former = c->in->triangle[3 * triangle + (uint64_t)k], v = c->number[former];
         put_number(c, v == NONE ? 0 : c->next - v);
         t[k] = v == NONE ? new_number(c, former, (prediction){ 0, 0, NONE }) : v;
-        add_vertex(&c->recent, t[k]);
     }
-    add_edges(&c->recent, t, true);
+    add_first_edges(&c->edges, t);
 }
 
-/* Encodes all triangles. Each step takes a triangle that is not yet encoded, at the most recent
- * edge that has such a triangle. If no recent edge has such a triangle, the step takes the first
- * triangle that is not yet encoded. Vertices without triangles get the last numbers. */
+/* Encodes all triangles. Each step takes a triangle that is not yet encoded, at the last open edge.
+ * If no edge is open, the step takes the first triangle that is not yet encoded. Vertices without
+ * triangles get the last numbers. */
 static void put_triangles(coder *c)
 {
     uint64_t first = 0;
-    for (uint64_t remaining = c->in->triangle_count; remaining; remaining--) {
-        uint32_t i = NONE;
-        unsigned edge = 0;
-        for (; edge < c->recent.edges && i == NONE; edge += i == NONE)
-            i = find_corner(c, c->vertex[c->recent.edge[edge].from],
-                            c->vertex[c->recent.edge[edge].to]);
-        if (i != NONE) {
-            put_attached(c, edge, i);
-            c->done[i / 3] = true;
-            continue;
+    for (uint64_t remaining = c->in->triangle_count; remaining;) {
+        open_edge e;
+        uint64_t taken;
+        if (take_edge(&c->edges, &e)) {
+            uint32_t i = find_corner(c, c->vertex[e.from], c->vertex[e.to]);
+            if (i == NONE) {
+                put_byte(c, NO_TRIANGLE);
+                end_edge(&c->edges, &e);
+                continue;
+            }
+            put_attached(c, &e, i);
+            taken = i / 3;
+        } else {
+            while (c->done[first])
+                first++;
+            put_free(c, first);
+            taken = first;
         }
-        while (c->done[first])
-            first++;
-        put_free(c, first);
-        c->done[first] = true;
+        c->done[taken] = true;
+        remaining--;
     }
     for (uint32_t v = 0; v < c->in->vertex_count; v++)
         if (c->number[v] == NONE)
             new_number(c, v, (prediction){ 0, 0, NONE });
 }
 
+/* Returns false if the reader computes the normal of vertex v. */
+static bool is_stored(const uint8_t *normal, uint64_t v)
+{
+    return normal[2 * v] || normal[2 * v + 1];
+}
+
 static double sign_of(double v) { return v < 0 ? -1 : 1; }
 
 /* Projects a direction on an octahedron, which is unfolded to a square: returns two coordinates
- * from 0 to 254, 127 in the middle. */
+ * from 0 to 2 NORMAL_STEPS, NORMAL_STEPS in the middle. */
 static void encode_normal(const double n[3], uint8_t out[2])
 {
-    double sum = fabs(n[0]) + fabs(n[1]) + fabs(n[2]), x = 0, y = 0;
-    if (sum > 0) {
-        x = n[0] / sum;
-        y = n[1] / sum;
-        if (n[2] < 0) {
-            double folded = (1 - fabs(y)) * sign_of(x);
-            y = (1 - fabs(x)) * sign_of(y);
-            x = folded;
-        }
+    double sum = fabs(n[0]) + fabs(n[1]) + fabs(n[2]), x = n[0] / sum, y = n[1] / sum;
+    if (n[2] < 0) {
+        double folded = (1 - fabs(y)) * sign_of(x);
+        y = (1 - fabs(x)) * sign_of(y);
+        x = folded;
     }
-    out[0] = (uint8_t)floor(x * 127 + 127.5);
-    out[1] = (uint8_t)floor(y * 127 + 127.5);
+    out[0] = (uint8_t)floor(x * NORMAL_STEPS + NORMAL_STEPS + 0.5);
+    out[1] = (uint8_t)floor(y * NORMAL_STEPS + NORMAL_STEPS + 0.5);
+}
+
+/* Sets a normal to length 1. A normal of length 0 becomes (0, 0, 1). */
+static void set_normal(const double n[3], float out[3])
+{
+    double length = ebpo_vec3_length(n);
+    for (int k = 0; k < 3; k++)
+        out[k] = length > 0 ? (float)(n[k] / length) : k == 2;
 }
 
 static void decode_normal(const uint8_t in[2], float out[3])
 {
-    double x = (in[0] - 127.0) / 127, y = (in[1] - 127.0) / 127, z = 1 - fabs(x) - fabs(y);
+    double x = (double)(in[0] - NORMAL_STEPS) / NORMAL_STEPS,
+           y = (double)(in[1] - NORMAL_STEPS) / NORMAL_STEPS, z = 1 - fabs(x) - fabs(y);
     if (z < 0) {
         double folded = (1 - fabs(y)) * sign_of(x);
         y = (1 - fabs(x)) * sign_of(y);
         x = folded;
     }
-    double length = sqrt(x * x + y * y + z * z);
-    out[0] = (float)(x / length);
-    out[1] = (float)(y / length);
-    out[2] = (float)(z / length);
+    set_normal((double[3]){ x, y, z }, out);
 }
 
 /* Returns the number that stands for a difference of 16 bits: 0, -1, 1, -2, ... become 0, 1, 2, 3,
@@ -284,21 +364,28 @@ static uint16_t encode_zigzag(int32_t value)
 
 static int32_t decode_zigzag(uint16_t code) { return code >> 1 ^ -(code & 1); }
 
-/* Writes the rows of vertices, as differences. `point`, `normal`: temporary memory for the vertices
- * in the order of their new numbers. */
-static void put_vertices(const coder *c, int16_t *point, uint8_t *normal)
+/* Writes the rows of vertices, as differences. `point`: temporary memory for the vertices in the
+ * order of their new numbers. */
+static void put_vertices(const coder *c, int16_t *point)
 {
+    uint8_t last[2] = { 0, 0 }; /* the last stored normal */
+    memset(c->out->normal, 0, 2 * c->in->vertex_count);
     for (uint32_t v = 0; v < c->in->vertex_count; v++) {
         uint32_t former = c->vertex[v], before = v ? vertex_before(&c->from[v], v) : 0;
         int32_t predicted[3];
+        const double *n = c->in->normal[former];
         memcpy(point + 3 * v, c->in->point + 3 * former, 3 * sizeof *point);
-        encode_normal(c->in->normal[former], normal + 2 * v);
         predict_point(point, &c->from[v], v, predicted);
         for (uint32_t k = 0; k < 3; k++)
             c->out->point[3 * v + k] = encode_zigzag(point[3 * v + k] - predicted[k]);
-        for (uint32_t k = 0; k < 2; k++)
-            c->out->normal[2 * v + k] =
-                (uint8_t)(normal[2 * v + k] - (v ? normal[2 * before + k] : 0));
+        if (n[0] != 0 || n[1] != 0 || n[2] != 0) {
+            uint8_t normal[2];
+            encode_normal(n, normal);
+            for (int k = 0; k < 2; k++)
+                c->out->normal[2 * v + (uint32_t)k] =
+                    (uint8_t)((normal[k] - last[k] + NORMALS) % NORMALS + 1);
+            memcpy(last, normal, sizeof last);
+        }
         for (uint32_t k = 0; k < 3 && c->out->colour; k++)
             c->out->colour[3 * v + k] =
                 (uint8_t)(c->in->colour[3 * former + k] -
@@ -327,26 +414,26 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
     c.vertex = ebpo_alloc(vertices, sizeof *c.vertex);
     c.from = ebpo_alloc(vertices, sizeof *c.from);
     int16_t *point = ebpo_alloc(vertices, 3 * sizeof *point);
-    uint8_t *normal = ebpo_alloc(vertices, 2);
     out->point = ebpo_alloc(vertices, 3 * sizeof *out->point);
     out->normal = ebpo_alloc(vertices, 2);
     out->colour = source->colour ? ebpo_alloc(vertices, 3) : NULL;
-    bool made = c.corner && c.done && c.number && c.vertex && c.from && point && normal &&
-                out->point && out->normal && (out->colour || !source->colour);
+    bool made = make_edges(&c.edges, triangles, vertices) && c.corner && c.done && c.number &&
+                c.vertex && c.from && point && out->point && out->normal &&
+                (out->colour || !source->colour);
     if (made) {
         memset(c.corner, 0xff, c.slots * sizeof *c.corner);
         memset(c.number, 0xff, vertices * sizeof *c.number);
         enter_edges(&c);
         put_triangles(&c);
-        put_vertices(&c, point, normal);
+        put_vertices(&c, point);
     }
+    free_edges(&c.edges);
     free(c.corner);
     free(c.done);
     free(c.number);
     free(c.vertex);
     free(c.from);
     free(point);
-    free(normal);
     return made && !c.short_of_memory ? EBPO_OK : ebpo_fail_memory(error, vertices * 32);
 }
 
@@ -355,7 +442,7 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
 /* State of decoding a patch. The functions below return false for a wrong code. */
 typedef struct decoder {
     const uint8_t *code, *end; /* the next byte, and the end of the code */
-    recent recent;
+    open_edges edges;
     uint32_t next, vertices; /* number of vertices so far, and of the patch */
     prediction *from;        /* [vertices] how the position of each vertex is predicted */
 } decoder;
@@ -382,7 +469,7 @@ static bool take_new(decoder *d, prediction from, uint32_t *out)
     return true;
 }
 
-/* Decodes a triangle that has no recent edge, after its first byte. */
+/* Decodes a triangle when no edge is open. */
 static bool get_free(decoder *d, uint32_t t[3])
 {
     for (int k = 0; k < 3; k++) {
@@ -392,43 +479,49 @@ static bool get_free(decoder *d, uint32_t t[3])
         t[k] = d->next - back;
         if (back == 0 && !take_new(d, (prediction){ 0, 0, NONE }, &t[k]))
             return false;
-        add_vertex(&d->recent, t[k]);
     }
-    add_edges(&d->recent, t, true);
+    add_first_edges(&d->edges, t);
     return true;
+}
+
+/* Decodes the third vertex of the triangle at the open edge `e`. `byte`: the first byte. */
+static bool get_third(decoder *d, const open_edge *e, unsigned byte, uint32_t *out)
+{
+    uint32_t back;
+    switch (byte) {
+    case NEW_VERTEX: return take_new(d, (prediction){ e->from, e->to, e->beyond }, out);
+    case LEFT_VERTEX: *out = e->before == NONE ? e->from : d->edges.edge[e->before].from; break;
+    case RIGHT_VERTEX: *out = e->after == NONE ? e->from : d->edges.edge[e->after].to; break;
+    case FAR_VERTEX:
+        if (!get_number(d, &back) || back >= d->next)
+            return false;
+        *out = d->next - 1 - back;
+        break;
+    default: return false;
+    }
+    return *out != e->from && *out != e->to;
 }
 
 /* Decodes the next triangle. t: the numbers of its vertices. */
 static bool get_triangle(decoder *d, uint32_t t[3])
 {
-    if (d->code == d->end)
-        return false;
-    unsigned byte = *d->code++, edge = byte >> 4, third = byte & 15;
-    if (edge == FREE_TRIANGLE)
-        return third == 0 && get_free(d, t);
-    if (edge >= d->recent.edges)
-        return false;
-    recent_edge e = d->recent.edge[edge];
-    if (third == NEW_VERTEX) {
-        if (!take_new(d, (prediction){ e.from, e.to, e.beyond }, &t[2]))
+    open_edge e;
+    while (take_edge(&d->edges, &e)) {
+        if (d->code == d->end)
             return false;
-    } else if (third == FAR_VERTEX) {
-        uint32_t back;
-        if (!get_number(d, &back) || back >= d->next)
+        unsigned byte = *d->code++;
+        if (byte == NO_TRIANGLE) {
+            end_edge(&d->edges, &e);
+            continue;
+        }
+        t[0] = e.from;
+        t[1] = e.to;
+        if (!get_third(d, &e, byte, &t[2]))
             return false;
-        t[2] = d->next - 1 - back;
-    } else if (third <= d->recent.vertices) {
-        t[2] = d->recent.vertex[third - 1];
-    } else {
-        return false;
+        add_edges(&d->edges, &e, t[2]);
+        return true;
     }
-    if (third == NEW_VERTEX || third == FAR_VERTEX)
-        add_vertex(&d->recent, t[2]);
-    t[0] = e.from;
-    t[1] = e.to;
-    remove_edge(&d->recent, edge);
-    add_edges(&d->recent, t, false);
-    return true;
+    return get_free(d, t);
 }
 
 double ebpo_patch_error_step(const ebpo_info *info)
@@ -451,8 +544,54 @@ typedef struct patch_rows {
     const uint16_t *point;
 } patch_rows;
 
+/* Adds the normal of each triangle, weighted by area, to the normals of its vertices that are not
+ * stored. point: [vertices][3] steps of the grid. */
+static void add_triangle_normals(const ebpo_info *info, const uint8_t *stored, const int16_t *point,
+                                 ebpo_patch *out)
+{
+    double longest = ebpo_patch_error_step(info) * 0x1p32, scale[3];
+    for (int k = 0; k < 3; k++)
+        scale[k] = info->box_size[k] / longest;
+    for (uint64_t i = 0; i < out->triangle_count; i++) {
+        const uint32_t *t = out->triangles + 3 * i;
+        double u[3], w[3], n[3];
+        for (int k = 0; k < 3; k++) {
+            u[k] = (point[3 * (uint64_t)t[1] + (uint64_t)k] -
+                    point[3 * (uint64_t)t[0] + (uint64_t)k]) *
+                   scale[k];
+            w[k] = (point[3 * (uint64_t)t[2] + (uint64_t)k] -
+                    point[3 * (uint64_t)t[0] + (uint64_t)k]) *
+                   scale[k];
+        }
+        ebpo_vec3_cross(u, w, n);
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3 && !is_stored(stored, t[c]); k++)
+                out->normals[3 * (uint64_t)t[c] + (uint64_t)k] += (float)n[k];
+    }
+}
+
+/* Sets the normals. point: [vertices][3] steps of the grid. */
+static void decode_normals(const ebpo_info *info, const uint8_t *stored, const int16_t *point,
+                           ebpo_patch *out)
+{
+    uint8_t last[2] = { 0, 0 };
+    memset(out->normals, 0, out->vertex_count * 3 * sizeof *out->normals);
+    add_triangle_normals(info, stored, point, out);
+    for (uint64_t v = 0; v < out->vertex_count; v++) {
+        float *n = out->normals + 3 * v;
+        if (is_stored(stored, v)) {
+            for (int k = 0; k < 2; k++)
+                last[k] =
+                    (uint8_t)((last[k] + stored[2 * v + (uint64_t)k] + NORMALS - 1) % NORMALS);
+            decode_normal(last, n);
+        } else {
+            set_normal((double[3]){ (double)n[0], (double)n[1], (double)n[2] }, n);
+        }
+    }
+}
+
 static void decode_vertices(const ebpo_info *info, const patch_rows *rows, const decoder *d,
-                            int16_t *point, uint8_t *normal, ebpo_patch *out)
+                            int16_t *point, ebpo_patch *out)
 {
     ebpo_box box = ebpo_root_box(info);
     ebpo_cell cell = { out->level, { out->at[0], out->at[1], out->at[2] } };
@@ -463,15 +602,12 @@ static void decode_vertices(const ebpo_info *info, const patch_rows *rows, const
         for (uint32_t k = 0; k < 3; k++)
             point[3 * v + k] =
                 (int16_t)(uint16_t)(uint32_t)(predicted[k] + decode_zigzag(rows->point[3 * v + k]));
-        for (uint32_t k = 0; k < 2; k++)
-            normal[2 * v + k] =
-                (uint8_t)(rows->normal[2 * v + k] + (v ? normal[2 * before + k] : 0));
         for (uint32_t k = 0; k < 3 && out->colours; k++)
             out->colours[3 * v + k] =
                 (uint8_t)(rows->colour[3 * v + k] + (v ? out->colours[3 * before + k] : 0));
         ebpo_patch_position(&box, cell, point + 3 * v, out->xyz + 3 * v);
-        decode_normal(normal + 2 * v, out->normals + 3 * v);
     }
+    decode_normals(info, rows->normal, point, out);
 }
 
 void ebpo_patch_free(ebpo_patch *patch)
@@ -509,24 +645,24 @@ static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, u
     decoder d = { .code = rows->code,
                   .end = rows->code + code_bytes,
                   .vertices = (uint32_t)vertices };
+    bool made = make_edges(&d.edges, out->triangle_count, vertices);
     d.from = ebpo_alloc(vertices, sizeof *d.from);
     int16_t *point = ebpo_alloc(vertices, 3 * sizeof *point);
-    uint8_t *normal = ebpo_alloc(vertices, 2);
     out->xyz = ebpo_alloc(vertices, 3 * sizeof *out->xyz);
     out->normals = ebpo_alloc(vertices, 3 * sizeof *out->normals);
     out->colours = rows->colour ? ebpo_alloc(vertices, 3) : NULL;
     out->triangles = ebpo_alloc(out->triangle_count, 3 * sizeof *out->triangles);
     ebpo_status status = EBPO_OK;
-    if (!d.from || !point || !normal || !out->xyz || !out->normals || !out->triangles ||
+    if (!made || !d.from || !point || !out->xyz || !out->normals || !out->triangles ||
         (rows->colour && !out->colours))
         status = ebpo_fail_memory(error, vertices * 48);
     if (status == EBPO_OK && !decode_triangles(&d, out->triangle_count, out->triangles))
         status = ebpo_fail(error, EBPO_E_FORMAT, "/surface/triangles: wrong code of a patch");
     if (status == EBPO_OK)
-        decode_vertices(info, rows, &d, point, normal, out);
+        decode_vertices(info, rows, &d, point, out);
+    free_edges(&d.edges);
     free(d.from);
     free(point);
-    free(normal);
     return status;
 }
 
@@ -673,14 +809,15 @@ static ebpo_status check_codes(const ebpo_check *check, const ebpo_surface *surf
         decoder d = { .code = code,
                       .end = code + row[EBPO_PATCH_CODE_BYTES],
                       .vertices = (uint32_t)row[EBPO_PATCH_VERTICES] };
-        if (!ebpo_grow(&from, &capacity, row[EBPO_PATCH_VERTICES], sizeof *from)) {
-            status = ebpo_fail_memory(error, row[EBPO_PATCH_VERTICES] * sizeof *from);
-            break;
-        }
+        bool made = make_edges(&d.edges, row[EBPO_PATCH_TRIANGLES], row[EBPO_PATCH_VERTICES]) &&
+                    ebpo_grow(&from, &capacity, row[EBPO_PATCH_VERTICES], sizeof *from);
         d.from = from;
-        if (!decode_triangles(&d, row[EBPO_PATCH_TRIANGLES], NULL))
+        if (!made)
+            status = ebpo_fail_memory(error, row[EBPO_PATCH_VERTICES] * 32);
+        else if (!decode_triangles(&d, row[EBPO_PATCH_TRIANGLES], NULL))
             status = ebpo_check_fail(check, -1, "/surface/triangles",
                                      "the code of a patch is wrong", error);
+        free_edges(&d.edges);
         code = d.end;
     }
     free(from);

@@ -11,7 +11,7 @@
  * of the node's cell. EBPO_PATCH_CELLS: the border of a patch has at most one vertex in each cell
  * that is EBPO_PATCH_CELLS levels below the node. EBPO_PATCH_LEVEL: deepest level of nodes with
  * patches. */
-enum { EBPO_PATCH_GRID = 10, EBPO_PATCH_CELLS = 5, EBPO_PATCH_LEVEL = 14 };
+enum { EBPO_PATCH_GRID = 9, EBPO_PATCH_CELLS = 6, EBPO_PATCH_LEVEL = 14 };
 
 /* A patch to encode. */
 typedef struct ebpo_patch_source {
@@ -19,7 +19,8 @@ typedef struct ebpo_patch_source {
     const uint32_t *triangle;  /* [triangle_count][3] vertex indices */
     const int16_t *point;      /* [vertex_count][3] steps of the grid from the lowest corner of the
                                   node's cell */
-    const double (*normal)[3]; /* [vertex_count] of any length */
+    const double (*normal)[3]; /* [vertex_count] of any length; 0: readers compute the normal from
+                                  the triangles */
     const uint8_t *colour;     /* [vertex_count][3], or NULL */
 } ebpo_patch_source;
 

@@ -38,11 +38,11 @@ typedef struct joiner {
     bool level_used[EBPO_PATCH_LEVEL + 1]; /* true: a patch of this level was joined */
 } joiner;
 
-/* Returns the key of a border cell: the level of the patch's node, and 19 bits (EBPO_PATCH_LEVEL +
+/* Returns the key of a border cell: the level of the patch's node, and 20 bits (EBPO_PATCH_LEVEL +
  * EBPO_PATCH_CELLS) for each coordinate. */
 static uint64_t make_key(int node_level, const uint32_t cell[3])
 {
-    return (uint64_t)node_level << 58 | (uint64_t)cell[2] << 38 | (uint64_t)cell[1] << 19 | cell[0];
+    return (uint64_t)node_level << 60 | (uint64_t)cell[2] << 40 | (uint64_t)cell[1] << 20 | cell[0];
 }
 
 /* Returns the slot of a key, or the empty slot where the key belongs. */

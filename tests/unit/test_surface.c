@@ -14,6 +14,7 @@
 #include "construct/surface_cover.h"
 #include "format/chunk_directory.h"
 #include "format/surface_patches.h"
+#include "geometry/vec3.h"
 #include "geometry/distance.h"
 #include "scratch.h"
 #include "solids.h"
@@ -32,8 +33,21 @@ static ebpo_mesh waves(uint32_t around, uint32_t across)
     return mesh;
 }
 
-/* Number of divisions of a torus: fewer where fewer inputs are wanted. */
-static uint32_t divisions(uint32_t all) { return ebpo_test_scale() < 1 ? all * 5 / 8 : all; }
+/* A torus with waves and a long horn, so that most of it is in one octant of its box, and its
+ * patches have more levels. */
+static ebpo_mesh horned(uint32_t around, uint32_t across)
+{
+    static const double at[3] = { 0.97, 0.97, 0 }, horn[3] = { 2.1, 2.7, 2 };
+    ebpo_mesh mesh = waves(around, across);
+    for (uint64_t v = 0; v < mesh.vertex_count; v++) {
+        double *p = mesh.xyz64 + 3 * v, square = 0;
+        for (int k = 0; k < 3; k++)
+            square += (p[k] - at[k]) * (p[k] - at[k]);
+        for (int k = 0; k < 3; k++)
+            p[k] += horn[k] * exp(-12 * square);
+    }
+    return mesh;
+}
 
 static void build(ebpo_tree *tree, ebpo_mesh mesh, unsigned threads)
 {
@@ -81,7 +95,7 @@ START_TEST(test_errors_hold)
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t state = 1;
-    build(&tree, waves(96, 56), 1);
+    build(&tree, waves(182, 92), 1);
     ck_assert_uint_gt(tree.surface.patch_count, 1);
     for (uint64_t i = 0; i < tree.surface.patch_count; i++) {
         ebpo_patch patch;
@@ -285,7 +299,7 @@ START_TEST(test_joined_levels_are_closed)
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
     uint64_t state = 2;
-    build(&tree, waves(300, 160), 2);
+    build(&tree, horned(220, 120), 2);
     const uint64_t *rows = tree.surface.patch;
     ck_assert_uint_gt(tree.surface.patch_count, 9);
     for (int level = 0; level < 4; level++) {
@@ -323,8 +337,8 @@ START_TEST(test_files_and_threads)
     ebpo_file *file;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_surface part;
-    build(&one, waves(120, 60), 1);
-    build(&three, waves(120, 60), 3);
+    build(&one, waves(182, 92), 1);
+    build(&three, waves(182, 92), 3);
     const ebpo_surface *a = &one.surface, *b = &three.surface;
     ck_assert_uint_eq(a->patch_count, b->patch_count);
     ck_assert_uint_eq(a->code_bytes, b->code_bytes);
@@ -350,6 +364,40 @@ START_TEST(test_files_and_threads)
 }
 END_TEST
 
+/* Nearly all triangles of a closed patch need one byte, and readers compute normals that are on no
+ * border. All normals are on the front of their triangles. */
+START_TEST(test_codes_are_short)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    build(&tree, waves(182, 92), 1);
+    const uint64_t *root = tree.surface.patch;
+    ck_assert_uint_lt(20 * root[EBPO_PATCH_CODE_BYTES], 21 * root[EBPO_PATCH_TRIANGLES]);
+    for (uint64_t i = 0; i < 2 * root[EBPO_PATCH_VERTICES]; i++)
+        ck_assert_uint_eq(tree.surface.normal[i], 0);
+    for (uint64_t i = 0; i < tree.surface.patch_count; i++) {
+        ebpo_patch patch;
+        must(ebpo_surface_decode(&tree.surface, &tree.info, i, &patch, &error), "decode", &error);
+        uint64_t back = 0;
+        for (uint64_t k = 0; k < patch.triangle_count; k++) {
+            double t[3][3], u[3], w[3], n[3];
+            get_triangle(&patch, k, t);
+            ebpo_vec3_subtract(t[1], t[0], u);
+            ebpo_vec3_subtract(t[2], t[0], w);
+            ebpo_vec3_cross(u, w, n);
+            for (int c = 0; c < 3; c++) {
+                const float *at =
+                    patch.normals + 3 * (uint64_t)patch.triangles[3 * k + (uint64_t)c];
+                back += (double)at[0] * n[0] + (double)at[1] * n[1] + (double)at[2] * n[2] < 0;
+            }
+        }
+        ck_assert_uint_lt(200 * back, patch.triangle_count);
+        ebpo_patch_free(&patch);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 /* A mesh with few faces has no patches, and no part. */
 START_TEST(test_few_faces_have_none)
 {
@@ -368,7 +416,7 @@ START_TEST(test_far_from_the_origin)
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_patch patch;
-    ebpo_mesh mesh = waves(120, 60);
+    ebpo_mesh mesh = waves(182, 92);
     for (uint64_t i = 0; i < 3 * mesh.vertex_count; i++)
         mesh.xyz64[i] = 1e15 + 1000 * mesh.xyz64[i];
     build(&tree, mesh, 1);
@@ -452,7 +500,7 @@ static void make_view(const char *name, uint32_t around, uint32_t across, ebpo_f
 {
     ebpo_tree tree;
     ebpo_error error = EBPO_ERROR_INIT;
-    build(&tree, waves(around, across), 2);
+    build(&tree, horned(around, across), 2);
     must(ebpo_tree_write(&tree, scratch(name), NULL, &error), "write", &error);
     ebpo_tree_free(&tree);
     must(ebpo_open(scratch(name), file, &error), "open", &error);
@@ -486,9 +534,9 @@ START_TEST(test_views_are_closed)
     ebpo_observer observer = EBPO_OBSERVER_INIT;
     ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
     uint64_t before = 0;
-    make_view("view.ebpo.h5", divisions(240), divisions(130), &file);
-    observer.eye[0] = 1.2;
-    observer.eye[2] = 0.9;
+    make_view("view.ebpo.h5", 220, 120, &file);
+    for (int k = 0; k < 3; k++)
+        observer.eye[k] = 0.9;
     options.observer = &observer;
     for (double pixels = 64; pixels > 0.01; pixels /= 4)
         for (int faces = 0; faces < 2; faces++) {
@@ -567,7 +615,7 @@ START_TEST(test_views_within_bytes)
     ebpo_view_options options = EBPO_VIEW_OPTIONS_INIT;
     uint64_t before = 0;
     ebpo_file *file;
-    make_view("bytes.ebpo.h5", divisions(240), divisions(130), &file);
+    make_view("bytes.ebpo.h5", 220, 120, &file);
     uint64_t most = ebpo_file_info(file)->file_bytes;
     ebpo_close(file);
     for (uint64_t limit = 1000; limit <= most; limit += most / 9) {
@@ -596,10 +644,10 @@ START_TEST(test_boxes_keep_patches)
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
     ebpo_file *file, *part;
     ebpo_surface_mesh whole, kept;
-    make_view("whole.ebpo.h5", 300, 160, &file);
+    make_view("whole.ebpo.h5", 220, 120, &file);
     subset.boxed = true;
     for (int k = 0; k < 3; k++) {
-        subset.min[k] = 0.2;
+        subset.min[k] = 1; /* not in the octant of most faces */
         subset.max[k] = 2;
     }
     must(ebpo_subset(file, scratch("part.ebpo.h5"), &subset, &error), "subset", &error);
@@ -610,7 +658,7 @@ START_TEST(test_boxes_keep_patches)
     must(ebpo_verify(part, NULL, &report, &error), "verify", &error);
     ck_assert_uint_eq(report.violations, 0);
     for (int k = 0; k < 3; k++)
-        observer.eye[k] = 0.9; /* in the box */
+        observer.eye[k] = 1.5; /* in the box */
     options.observer = &observer;
     options.pixels = 12;
     must(take_view(file, &options, &whole, &error), "view", &error);
@@ -678,7 +726,7 @@ START_TEST(test_patches_that_name_all_faces)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_verify_options options = EBPO_VERIFY_OPTIONS_INIT;
     ebpo_verify_report report = EBPO_VERIFY_REPORT_INIT;
-    build(&tree, waves(120, 60), 1);
+    build(&tree, waves(182, 92), 1);
     for (uint64_t i = 1; i < tree.surface.patch_count; i++) {
         uint64_t *row = tree.surface.patch + EBPO_PATCH_COLUMNS * i;
         row[EBPO_PATCH_FIRST_FACE] = 0;
@@ -706,6 +754,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_covers);
     tcase_add_test(tests, test_joined_levels_are_closed);
     tcase_add_test(tests, test_files_and_threads);
+    tcase_add_test(tests, test_codes_are_short);
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);
     tcase_add_test(tests, test_too_many_triangles);

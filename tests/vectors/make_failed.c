@@ -580,7 +580,7 @@ static void v_surface_counts(void) { set_count("/", "surface_patches", 1 << 20);
 static void v_surface_octcode(void) { poke("/surface/patches", 0, 3); }
 static void v_surface_faces(void) { poke("/surface/patches", 2, 2305); }
 static void v_surface_triangles(void) { add_to("/surface/patches", 3, 1); }
-static void v_surface_code(void) { poke("/surface/triangles", 0, 0); }
+static void v_surface_code(void) { poke("/surface/triangles", 0, 1); }
 static void v_surface_changed(void) { add_to("/surface/normals", 0, 1); }
 static void v_surface_node(void) { add_to("/surface/patches", 2, -1); }
 static void v_surface_error(void) { poke("/surface/patches", 6, 1); }

@@ -51,7 +51,7 @@ typedef struct tile {
     ebpo_mesh mesh;
     ebpo_colours colours;  /* colours of the model, if it has colours */
     float *normals;        /* normals of the triangles of a level, for lighting; or NULL */
-    float *vertex_normals; /* normals of the vertices of a simplified surface; or NULL */
+    float *vertex_normals; /* normals of vertices, for lighting; or NULL */
     uint8_t *paint;        /* with --caps: RASTER_RED for caps, RASTER_PLAIN for faces; or NULL */
     bool closed;           /* only front sides of faces are visible */
     char caption[64];
@@ -194,6 +194,8 @@ static ebpo_status load_tile(job *j, tile *t, ebpo_file *file, ebpo_progress pro
         t->closed = info->solid && info->report.manifold;
         read.attributes = !j->v.no_colours && !j->v.caps;
         ebpo_status read_status = ebpo_file_read_mesh(file, &read, &t->mesh, error);
+        if (read_status == EBPO_OK && j->tile_count > 1) /* lit like the levels beside it */
+            read_status = mesh_normals(info, &t->mesh, &t->vertex_normals, error);
         if (read_status == EBPO_OK && j->v.caps)
             return add_caps(t, file, remote_shown(j->in), error);
         return read_status == EBPO_OK ? ebpo_mesh_colours(&t->mesh, &t->colours, error)
