@@ -1,7 +1,7 @@
-/* Declares two inner loops (kernels): find_visible for convex hulls (hull_directions.c), and
- * `highest` for supports (supports.h). They process four doubles at a time. sweep_kernels.c is
- * compiled once for each instruction set. All these variants do the same operations in the same
- * order, so they give the same results. */
+/* Declares three inner loops (kernels): find_visible for convex hulls (hull_directions.c),
+ * `highest` for supports (supports.h), and find_separated for faces and cells (triangle_cell.c).
+ * They process four doubles at a time. sweep_kernels.c is compiled once for each instruction set.
+ * All these variants do the same operations in the same order, so they give the same results. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
 #define EBPO_CONSTRUCT_SWEEP_H
 
@@ -43,6 +43,10 @@ typedef struct ebpo_sweep {
      * point of the stretch that contains this value, or UINT64_MAX if *best was not raised. */
     uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
                         double *best);
+    /* Returns a mask of the octants of a cell that a plane separates from a face, so that the face
+     * certainly does not touch them. `face`: the face's corners; `low`, `size`: lowest corner and
+     * size of the cell. All are in the model's coordinates. */
+    unsigned (*find_separated)(const double face[3][3], const double low[3], const double size[3]);
 } ebpo_sweep;
 
 EBPO_KERNELS(ebpo_sweep, ebpo_sweep)

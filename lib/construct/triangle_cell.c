@@ -11,9 +11,11 @@
 #include "core/strict_fp.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "construct/construct_stages.h"
 #include "construct/planes.h"
+#include "construct/sweep.h"
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
@@ -26,7 +28,7 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     double greatest = 1;
     for (int k = 0; k < 3; k++) {
         double corner = ebpo_cell_face(box, k, cell.level, cell.at[k]);
-        double size = box->size[k] / (double)(1u << cell.level);
+        double size = box->size[k] * ebpo_half_power(cell.level);
         for (int i = 0; i < 3; i++) {
             x[i][k] = (face->corner[i][k] - corner) / size;
             double a = fabs(x[i][k]);
@@ -72,25 +74,39 @@ static int clip_cell_face(double in[9][3], int count, int axis, double sign, dou
     return kept;
 }
 
+static void swap_buffers(double (**a)[3], double (**b)[3])
+{
+    double(*c)[3] = *a;
+    *a = *b;
+    *b = c;
+}
+
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack)
 {
-    double x[3][3], buffer[9][3], e = slack_for(to_cell(box, cell, face, x));
+    double x[3][3], buffer[9][3], (*at)[3] = points, (*other)[3] = buffer,
+                                  e = slack_for(to_cell(box, cell, face, x));
     *slack = e;
     int count = 3;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             points[i][k] = x[i][k];
     for (int k = 0; k < 3; k++) {
-        double low = fmin(x[0][k], fmin(x[1][k], x[2][k])),
-               high = fmax(x[0][k], fmax(x[1][k], x[2][k]));
+        double low = ebpo_min3(x[0][k], x[1][k], x[2][k]),
+               high = ebpo_max3(x[0][k], x[1][k], x[2][k]);
         if (low > 1 + e || high < -e)
             return 0;
         if (high <= 1 + e && low >= -e)
             continue;
-        int n = clip_cell_face(points, count, k, 1, 1 + e, buffer);
-        count = clip_cell_face(buffer, n, k, -1, e, points);
+        /* A corner that an earlier clip made may be beyond the face's bounds, but by less than e.
+         * So a clip at a cell face that the bounds do not cross changes nothing, and is omitted. */
+        if (high > 1)
+            count = clip_cell_face(at, count, k, 1, 1 + e, other), swap_buffers(&at, &other);
+        if (low < 0)
+            count = clip_cell_face(at, count, k, -1, e, other), swap_buffers(&at, &other);
     }
+    if (at != points)
+        memcpy(points, at, (size_t)count * sizeof *points);
     return count;
 }
 
@@ -147,10 +163,10 @@ static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebp
     for (int k = 0; k < 3; k++) {
         double cell_face = ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1),
                a = face->corner[0][k], b = face->corner[1][k], c = face->corner[2][k];
-        if (a > cell_face && b > cell_face && c > cell_face)
-            mask &= ~low_side[k];
-        if (a < cell_face && b < cell_face && c < cell_face)
-            mask &= low_side[k];
+        /* without branches, because the processor could predict few of them */
+        bool above = (a > cell_face) & (b > cell_face) & (c > cell_face),
+             below = (a < cell_face) & (b < cell_face) & (c < cell_face);
+        mask &= ~(low_side[k] & -(unsigned)above) & (low_side[k] | ((unsigned)below - 1));
     }
     return mask;
 }
@@ -160,18 +176,12 @@ unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_tr
     unsigned mask = octants_of_bounds(box, cell, face);
     if ((mask & (mask - 1)) == 0)
         return mask;
-    separation s;
-    s.greatest = to_cell(box, cell, face, s.x);
-    separation_prepare(&s);
-    for (unsigned octant = 0; octant < 8; octant++) {
-        if (!(mask >> octant & 1))
-            continue;
-        double centre[3];
-        for (int k = 0; k < 3; k++)
-            centre[k] = octant >> k & 1 ? 0.75 : 0.25;
-        if (is_separated(&s, centre, 0.25))
-            mask &= ~(1u << octant);
+    double low[3], size[3];
+    for (int k = 0; k < 3; k++) {
+        low[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
+        size[k] = box->size[k] * ebpo_half_power(cell.level);
     }
+    mask &= ~ebpo_sweep_best()->find_separated(face->corner, low, size);
     return mask;
 }
 
@@ -181,8 +191,8 @@ bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_t
     s.greatest = to_cell(box, cell, face, s.x);
     double e = slack_for(s.greatest);
     for (int k = 0; k < 3; k++)
-        if (fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])) > 1 + e ||
-            fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k])) < -e)
+        if (ebpo_min3(s.x[0][k], s.x[1][k], s.x[2][k]) > 1 + e ||
+            ebpo_max3(s.x[0][k], s.x[1][k], s.x[2][k]) < -e)
             return true;
     separation_prepare(&s);
     return is_separated(&s, (const double[3]){ 0.5, 0.5, 0.5 }, 0.5);
