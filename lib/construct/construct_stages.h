@@ -98,7 +98,7 @@ void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
  * are list[entries[0]] to list[entries[count - 1]] of the branch. If `entries` is NULL, they are
  * the first `count` faces of the list. Long lists are processed EBPO_CORNER_FACES faces at a time,
  * so `buffer` must have space for the lesser of EBPO_CORNER_FACES and `count` triangles. */
-enum { EBPO_CORNER_FACES = 1 << 14 };
+enum { EBPO_CORNER_FACES = 1 << 9 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);

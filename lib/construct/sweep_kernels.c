@@ -1,6 +1,4 @@
-/* Implements the three kernels of sweep.h, which process four doubles at a time. The first kernel
- * finds the planes below a point. The second kernel finds the greatest value among points. The
- * third kernel finds the octants of a cell that a face misses.
+/* Implements the kernels of sweep.h, which process four doubles at a time.
  * meson.build compiles this file once for each instruction set. All variants do the same operations
  * in the same order, so they give the same results. core/cpu.h chooses the variant. */
 #include "core/strict_fp.h"
@@ -16,6 +14,68 @@
 typedef v4d v4d_stored __attribute__((aligned(8), may_alias));
 
 static v4d load_four(const double *at) { return *(const v4d_stored *)at; }
+
+/* Implements ebpo_sweep.find_extremes. Two vectors have a point's coordinates along the axes and
+ * along the diagonals; the last lane of the first vector is unused. */
+static void find_extreme_points(const double (*p)[3], int count, int at[EBPO_SWEEP_EXTREMES])
+{
+    v4d high[2], low[2];
+    v4l at_high[2], at_low[2];
+    for (int j = 0; j < 2; j++) {
+        high[j] = v4d_all(-INFINITY), low[j] = v4d_all(INFINITY);
+        at_high[j] = at_low[j] = (v4l){ 0, 0, 0, 0 };
+    }
+    for (int i = 0; i < count; i++) {
+        double x = p[i][0], y = p[i][1], z = p[i][2], sum = x + y, difference = x - y;
+        const v4d along[2] = { { x, y, z, z },
+                               (v4d){ sum, sum, difference, difference } + (v4d){ z, -z, z, -z } };
+        const v4l index = { i, i, i, i };
+        for (int j = 0; j < 2; j++) {
+            v4l higher = along[j] > high[j], lower = along[j] < low[j];
+            high[j] = v4d_pick(higher, along[j], high[j]);
+            low[j] = v4d_pick(lower, along[j], low[j]);
+            at_high[j] = (index & higher) | (at_high[j] & ~higher);
+            at_low[j] = (index & lower) | (at_low[j] & ~lower);
+        }
+    }
+    for (int w = 0; w < EBPO_SWEEP_EXTREMES / 2; w++) {
+        int j = w >= 3, lane = w >= 3 ? w - 3 : w;
+        at[2 * w] = (int)at_high[j][lane];
+        at[2 * w + 1] = (int)at_low[j][lane];
+    }
+}
+
+/* Implements ebpo_sweep.make_planes. */
+static void make_planes_of_edges(const double (*p)[3], const uint32_t *edge, int count, int apex,
+                                 ebpo_sweep_plane *out)
+{
+    for (int first = 0; first < count; first += 4) {
+        v4d a[3], u[3], v[3], n[3], length;
+        const double *from[4], *to[4];
+        for (int i = 0; i < 4; i++) {
+            uint32_t e = edge[first + i < count ? first + i : count - 1];
+            from[i] = p[e >> 16];
+            to[i] = p[e & 0xffff];
+        }
+        for (int k = 0; k < 3; k++) {
+            a[k] = (v4d){ from[0][k], from[1][k], from[2][k], from[3][k] };
+            u[k] = (v4d){ to[0][k], to[1][k], to[2][k], to[3][k] } - a[k];
+            v[k] = v4d_all(p[apex][k]) - a[k];
+        }
+        for (int k = 0; k < 3; k++) {
+            int i = (k + 1) % 3, j = (k + 2) % 3;
+            n[k] = u[i] * v[j] - u[j] * v[i];
+        }
+        v4d square = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+        for (int i = 0; i < 4; i++)
+            length[i] = sqrt(square[i]);
+        for (int k = 0; k < 3; k++)
+            n[k] = n[k] / length;
+        v4d d = n[0] * a[0] + n[1] * a[1] + n[2] * a[2];
+        for (int i = 0; i < 4 && first + i < count; i++)
+            out[first + i] = (ebpo_sweep_plane){ { n[0][i], n[1][i], n[2][i] }, d[i], length[i] };
+    }
+}
 
 /* Adds first + i to the list for each bit i that is set in `bits`. Returns the new count, which
  * also counts elements beyond `capacity`. */
@@ -156,5 +216,6 @@ static unsigned find_separated_octants(const double face[3][3], const double low
     return separated;
 }
 
-const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { find_visible_planes, highest_value,
+const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { find_extreme_points, make_planes_of_edges,
+                                             find_visible_planes, highest_value,
                                              find_separated_octants };
