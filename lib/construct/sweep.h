@@ -1,5 +1,5 @@
 /* Declares three inner loops (kernels): find_visible for convex hulls (hull_directions.c),
- * `highest` for supports (supports.h), and find_separated for faces and cells (triangle_cell.c).
+ * `highest` for supports (supports.h), and find_octants for faces and cells (triangle_cell.c).
  * They process four doubles at a time. sweep_kernels.c is compiled once for each instruction set.
  * All these variants do the same operations in the same order, so they give the same results. */
 #ifndef EBPO_CONSTRUCT_SWEEP_H
@@ -38,6 +38,12 @@ typedef struct ebpo_sweep_points {
     uint64_t fours; /* number of groups */
 } ebpo_sweep_points;
 
+/* A cell in the model's coordinates: lowest corner, centre and size. The last lane repeats the z
+ * axis. */
+typedef struct ebpo_sweep_cell {
+    double low[4], centre[4], size[4];
+} ebpo_sweep_cell;
+
 /* The kernels, compiled for one instruction set. */
 typedef struct ebpo_sweep {
     /* Finds the extreme point in each direction w: at[w] is its index, the first one if several
@@ -60,10 +66,9 @@ typedef struct ebpo_sweep {
      * point of the stretch that contains this value, or UINT64_MAX if *best was not raised. */
     uint64_t (*highest)(const ebpo_sweep_points *points, const double n[3], double enough,
                         double *best);
-    /* Returns a mask of the octants of a cell that a plane separates from a face, so that the face
-     * certainly does not touch them. `face`: the face's corners; `low`, `size`: lowest corner and
-     * size of the cell. All are in the model's coordinates. */
-    unsigned (*find_separated)(const double face[3][3], const double low[3], const double size[3]);
+    /* Returns a mask of the octants of a cell that a face may touch. An octant is omitted only if
+     * the face's bounding box or a plane certainly separates the face from it. */
+    unsigned (*find_octants)(const ebpo_sweep_cell *cell, const double face[3][3]);
 } ebpo_sweep;
 
 EBPO_KERNELS(ebpo_sweep, ebpo_sweep)

@@ -165,41 +165,51 @@ static const uint8_t octants_of_lanes[3][16] = {
       0xff },
 };
 
-/* Returns a mask of the octants on one side of the face's plane. `x`: corners in cell coordinates;
- * `tolerance`: bound of the rounding error. */
-static unsigned beyond_plane(const double x[3][3], const double normal[3], double tolerance)
+/* Returns a mask of the octants on one side of the face's plane. `x`: a corner of the face in cell
+ * coordinates; `tolerance`: bound of the rounding error. */
+static unsigned beyond_plane(const double x[3], const double normal[3], double tolerance)
 {
     double radius = fabs(normal[0]) + fabs(normal[1]) + fabs(normal[2]);
     v4d reach = v4d_all(0.25 * radius + tolerance),
-        xy = v4d_all(normal[0]) * (v4d_all(x[0][0]) - first_sides) +
-             v4d_all(normal[1]) * (v4d_all(x[0][1]) - second_sides),
-        lower = xy + v4d_all(normal[2] * (x[0][2] - 0.25)),
-        upper = xy + v4d_all(normal[2] * (x[0][2] - 0.75));
+        xy = v4d_all(normal[0]) * (v4d_all(x[0]) - first_sides) +
+             v4d_all(normal[1]) * (v4d_all(x[1]) - second_sides),
+        lower = xy + v4d_all(normal[2] * (x[2] - 0.25)),
+        upper = xy + v4d_all(normal[2] * (x[2] - 0.75));
     return v4l_mask(v4d_abs(lower) > reach) | v4l_mask(v4d_abs(upper) > reach) << 4;
 }
 
-/* Implements ebpo_sweep.find_separated. Two kinds of planes are tested: the plane of the face, and
- * planes whose normal is the cross product of an edge of the face with an axis. Let M be the
- * greatest cell coordinate (at least 1) and u = 2^-53. The rounding errors are at most 4 u M for
- * edges, 64 u M^2 for cross products, and 512 u M^3 for the plane. The tolerances are at least as
- * large. */
-static unsigned find_separated_octants(const double face[3][3], const double low[3],
-                                       const double size[3])
+/* [bit k: the face is above the centre on axis k] the octants that the face may touch; the same for
+ * faces below the centre */
+static const uint8_t octants_of_above[8] = { 0xff, 0xaa, 0xcc, 0x88, 0xf0, 0xa0, 0xc0, 0x80 },
+                     octants_of_below[8] = { 0xff, 0x55, 0x33, 0x11, 0x0f, 0x05, 0x03, 0x01 };
+
+/* Implements ebpo_sweep.find_octants. First the face's bounding box is compared with the centre,
+ * exactly. Then two kinds of planes are tested: the plane of the face, and planes whose normal is
+ * the cross product of an edge of the face with an axis. Let M be the greatest cell coordinate (at
+ * least 1) and u = 2^-53. The rounding errors are at most 4 u M for edges, 64 u M^2 for cross
+ * products, and 512 u M^3 for the plane. The tolerances are at least as large. */
+static unsigned find_octants_of_face(const ebpo_sweep_cell *cell, const double face[3][3])
 {
-    double x[3][3], edge[3][3], normal[3];
-    v4d greatest = v4d_all(1);
-    for (int k = 0; k < 3; k++) {
-        v4d of_axis = { face[0][k], face[1][k], face[2][k], face[2][k] };
-        of_axis = (of_axis - v4d_all(low[k])) / v4d_all(size[k]);
-        greatest = v4d_max(v4d_abs(of_axis), greatest);
-        for (int i = 0; i < 3; i++)
-            x[i][k] = of_axis[i];
+    double x[3][4], edge[3][3], normal[3];
+    v4d corner[3], centre = load_four(cell->centre), greatest = v4d_all(1);
+    for (int i = 0; i < 3; i++)
+        corner[i] = (v4d){ face[i][0], face[i][1], face[i][2], face[i][2] };
+    v4l above = (corner[0] > centre) & (corner[1] > centre) & (corner[2] > centre),
+        below = (corner[0] < centre) & (corner[1] < centre) & (corner[2] < centre);
+    unsigned octants =
+        octants_of_above[v4l_mask(above) & 7] & octants_of_below[v4l_mask(below) & 7];
+    if ((octants & (octants - 1)) == 0)
+        return octants;
+    for (int i = 0; i < 3; i++) {
+        v4d at = (corner[i] - load_four(cell->low)) / load_four(cell->size);
+        greatest = v4d_max(v4d_abs(at), greatest);
+        memcpy(x[i], &at, sizeof at);
     }
     for (int i = 0; i < 3; i++)
         ebpo_vec3_subtract(x[(i + 1) % 3], x[i], edge[i]);
     ebpo_vec3_cross(edge[0], edge[1], normal);
     double m = v4d_greatest(greatest), tolerance = 0x1p-46 * m * m;
-    unsigned separated = beyond_plane((const double(*)[3])x, normal, 0x1p-44 * m * m * m);
+    unsigned separated = beyond_plane(x[0], normal, 0x1p-44 * m * m * m);
     for (int k = 0; k < 3; k++) {
         int a = (k + 1) % 3, b = (k + 2) % 3;
         v4l any = { 0, 0, 0, 0 };
@@ -213,9 +223,9 @@ static unsigned find_separated_octants(const double face[3][3], const double low
         }
         separated |= octants_of_lanes[k][v4l_mask(any)];
     }
-    return separated;
+    return octants & ~separated;
 }
 
 const ebpo_sweep EBPO_KERNEL(ebpo_sweep) = { find_extreme_points, make_planes_of_edges,
                                              find_visible_planes, highest_value,
-                                             find_separated_octants };
+                                             find_octants_of_face };

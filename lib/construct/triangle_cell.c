@@ -154,35 +154,21 @@ static bool is_separated(const separation *s, const double centre[3], double hal
     return false;
 }
 
-/* Returns a mask of the octants that the face's bounding box touches. The face's coordinates are
- * compared with the exact coordinates of the planes between the octants. */
-static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+ebpo_sweep_cell ebpo_octants_prepare(const ebpo_box *box, ebpo_cell cell)
 {
-    static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
-    unsigned mask = 255;
-    for (int k = 0; k < 3; k++) {
-        double cell_face = ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1),
-               a = face->corner[0][k], b = face->corner[1][k], c = face->corner[2][k];
-        /* without branches, because the processor could predict few of them */
-        bool above = (a > cell_face) & (b > cell_face) & (c > cell_face),
-             below = (a < cell_face) & (b < cell_face) & (c < cell_face);
-        mask &= ~(low_side[k] & -(unsigned)above) & (low_side[k] | ((unsigned)below - 1));
+    ebpo_sweep_cell out;
+    for (int lane = 0; lane < 4; lane++) {
+        int k = lane < 3 ? lane : 2;
+        out.low[lane] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
+        out.centre[lane] = ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1);
+        out.size[lane] = box->size[k] * ebpo_half_power(cell.level);
     }
-    return mask;
+    return out;
 }
 
-unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
+unsigned ebpo_octants_visited(const ebpo_sweep_cell *cell, const ebpo_triangle *face)
 {
-    unsigned mask = octants_of_bounds(box, cell, face);
-    if ((mask & (mask - 1)) == 0)
-        return mask;
-    double low[3], size[3];
-    for (int k = 0; k < 3; k++) {
-        low[k] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
-        size[k] = box->size[k] * ebpo_half_power(cell.level);
-    }
-    mask &= ~ebpo_sweep_best()->find_separated(face->corner, low, size);
-    return mask;
+    return ebpo_sweep_best()->find_octants(cell, face->corner);
 }
 
 bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
