@@ -1,5 +1,5 @@
-/* Compares a face with a cell: finds the octants of the cell that the face may touch, tests if the
- * face misses the cell, and clips the face to the cell.
+/* Compares a face with a cell: finds the octants of the cell that the face may touch, and clips the
+ * face to the cell.
  *
  * All tests use a bound of the rounding error and are conservative, so no exact arithmetic is
  * needed. A test may keep a face that does not touch the cell, but it never drops a face that
@@ -110,50 +110,6 @@ int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle 
     return count;
 }
 
-/* A face in cell coordinates, for tests of separating axes: corners, edges and normal. */
-typedef struct separation {
-    double x[3][3], edge[3][3], normal[3];
-    double greatest; /* greatest absolute coordinate, at least 1 */
-} separation;
-
-/* Computes the edges and the normal from the corners. */
-static void separation_prepare(separation *s)
-{
-    for (int i = 0; i < 3; i++)
-        ebpo_vec3_subtract(s->x[(i + 1) % 3], s->x[i], s->edge[i]);
-    ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
-}
-
-/* Returns true if a plane separates the face from the cube around `centre` whose sides have the
- * length 2 * half. Two kinds of planes are tested: the plane of the face, and planes whose normal
- * is the cross product of an edge of the face with an axis. Let M be the greatest coordinate and u
- * = 2^-53. The rounding errors are at most 4 u M for edges, 64 u M^2 for cross products, and 512 u
- * M^3 for the plane. The tolerances in this function are at least as large. */
-static bool is_separated(const separation *s, const double centre[3], double half)
-{
-    double m = s->greatest, tolerance = 0x1p-44 * m * m * m;
-    double distance = 0, radius = 0;
-    for (int k = 0; k < 3; k++) {
-        distance += s->normal[k] * (s->x[0][k] - centre[k]);
-        radius += fabs(s->normal[k]);
-    }
-    if (fabs(distance) > half * radius + tolerance)
-        return true;
-    tolerance = 0x1p-46 * m * m;
-    for (int i = 0; i < 3; i++) {
-        const double *p = s->x[i], *q = s->x[(i + 2) % 3], *e = s->edge[i];
-        for (int k = 0; k < 3; k++) {
-            int a = (k + 1) % 3, b = (k + 2) % 3;
-            double dp = e[a] * (p[b] - centre[b]) - e[b] * (p[a] - centre[a]);
-            double dq = e[a] * (q[b] - centre[b]) - e[b] * (q[a] - centre[a]);
-            double r = half * (fabs(e[a]) + fabs(e[b])) + tolerance;
-            if ((dp > r && dq > r) || (dp < -r && dq < -r))
-                return true;
-        }
-    }
-    return false;
-}
-
 ebpo_sweep_cell ebpo_octants_prepare(const ebpo_box *box, ebpo_cell cell)
 {
     ebpo_sweep_cell out;
@@ -171,25 +127,14 @@ unsigned ebpo_octants_visited(const ebpo_sweep_cell *cell, const ebpo_triangle *
     return ebpo_sweep_best()->find_octants(cell, face->corner);
 }
 
-bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
-{
-    separation s;
-    s.greatest = to_cell(box, cell, face, s.x);
-    double e = slack_for(s.greatest);
-    for (int k = 0; k < 3; k++)
-        if (ebpo_min3(s.x[0][k], s.x[1][k], s.x[2][k]) > 1 + e ||
-            ebpo_max3(s.x[0][k], s.x[1][k], s.x[2][k]) < -e)
-            return true;
-    separation_prepare(&s);
-    return is_separated(&s, (const double[3]){ 0.5, 0.5, 0.5 }, 0.5);
-}
-
 bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal)
 {
     /* every cell has the shape of the root box, so the normal in the root's coordinates is the
      * normal in any cell's coordinates */
-    separation s;
-    s.greatest = to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, s.x);
-    separation_prepare(&s);
-    return ebpo_plane_code_normal(s.normal, normal);
+    double x[3][3], edge[2][3], direction[3];
+    (void)to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, x);
+    ebpo_vec3_subtract(x[1], x[0], edge[0]);
+    ebpo_vec3_subtract(x[2], x[1], edge[1]);
+    ebpo_vec3_cross(edge[0], edge[1], direction);
+    return ebpo_plane_code_normal(direction, normal);
 }
