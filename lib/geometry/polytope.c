@@ -522,9 +522,9 @@ bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytop
 
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
-    ebpo_polytope half, quarter;
-    bool not_empty = ebpo_polytope_half(p, 2, octant >> 2 & 1, &half);
-    not_empty = ebpo_polytope_half(&half, 1, octant >> 1 & 1, &quarter) && not_empty;
+    ebpo_polytope quarter;
+    bool not_empty = ebpo_polytope_half(p, 2, octant >> 2 & 1, out);
+    not_empty = ebpo_polytope_half(out, 1, octant >> 1 & 1, &quarter) && not_empty;
     return ebpo_polytope_half(&quarter, 0, octant & 1, out) && not_empty;
 }
 
