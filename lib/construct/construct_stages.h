@@ -7,6 +7,7 @@
 
 #include "construct/builder.h"
 #include "construct/planes.h"
+#include "construct/sweep.h"
 
 /* --- partition.c: the nodes of a piece and the face lists of its leaves --- */
 
@@ -44,9 +45,12 @@ ebpo_status ebpo_build_levels(ebpo_builder *b, ebpo_tree *out, ebpo_error *error
 
 /* --- triangle_cell.c: a face and a cell --- */
 
+/* Returns a cell for ebpo_octants_visited. */
+ebpo_sweep_cell ebpo_octants_prepare(const ebpo_box *box, ebpo_cell cell);
+
 /* Returns a mask for a face that touches the cell: bit i is set if the face touches octant i of the
  * cell. Bit i may also be set if the face misses octant i by a rounding error. */
-unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
+unsigned ebpo_octants_visited(const ebpo_sweep_cell *cell, const ebpo_triangle *face);
 
 /* --- face_numbers.c: final indices of faces, in the order of the leaves that list them first ---
  */
@@ -98,7 +102,7 @@ void ebpo_child_windings(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell 
  * are list[entries[0]] to list[entries[count - 1]] of the branch. If `entries` is NULL, they are
  * the first `count` faces of the list. Long lists are processed EBPO_CORNER_FACES faces at a time,
  * so `buffer` must have space for the lesser of EBPO_CORNER_FACES and `count` triangles. */
-enum { EBPO_CORNER_FACES = 1 << 14 };
+enum { EBPO_CORNER_FACES = 1 << 9 };
 void ebpo_branch_corners(const ebpo_builder *b, const ebpo_branch *s, ebpo_cell cell,
                          const uint32_t *entries, uint64_t count, ebpo_triangle *buffer,
                          int32_t delta[8]);

@@ -356,11 +356,17 @@ static double hull_candidates(ebpo_envelope_scratch *s, double tolerance)
         if (s->count == EBPO_PLANES_CANDIDATES || !ebpo_plane_code_normal(s->facet[i].n, &normal) ||
             !new_normal(s, normal))
             continue;
-        double where[3];
+        /* the search begins at the facet's corners, which are about the farthest points, so it
+         * skips most other points */
+        double corner[3][3], where[3];
+        for (int c = 0; c < 3; c++)
+            ebpo_vec3_copy(s->hull_points[s->facet[i].corner[c]], corner[c]);
         ebpo_plane_code_decode(normal, n, &d);
         s->candidates[s->count++] =
             (ebpo_candidate){ .normal = normal,
-                              .support = ebpo_supports_find(&s->supports, n, 1e300, where) };
+                              .support =
+                                  ebpo_supports_find_from(&s->supports, n, 1e300,
+                                                          (const double(*)[3])corner, 3, where) };
     }
     return fmax(0, volume);
 }

@@ -29,8 +29,7 @@ _Static_assert((int)EBPO_HULL_FACETS <= (int)EBPO_SWEEP_PLANES, "sweeps have spa
 
 enum {
     FACETS_MAX = EBPO_HULL_FACETS,
-    /* number of directions of extreme points: three axes and four diagonals, both ways */
-    EXTREMES = 14,
+    EXTREMES = EBPO_SWEEP_EXTREMES,
     VISIBLE_MAX = 192 /* maximum number of facets that one point replaces */
 };
 
@@ -66,19 +65,13 @@ static void set_plane(hull *h, int i, const double n[3], double d)
 }
 
 /* Makes facet i with the corners a, b and c. Returns false if the facet has no area. */
-static bool make_facet(hull *h, int i, int a, int b, int c)
+static bool make_facet(hull *h, int i, uint32_t a, uint32_t b, int c, const ebpo_sweep_plane *plane)
 {
-    double n[3];
-    cross_of(h->p, a, b, c, n);
     static const double least_length = 1e-18; /* a shorter normal gives no direction */
-    double length = ebpo_vec3_length(n);
-    if (!(length > least_length))
+    if (!(plane->length > least_length))
         return false;
-    const double *p = h->p[a];
-    for (int k = 0; k < 3; k++)
-        n[k] /= length;
-    set_plane(h, i, n, ebpo_vec3_dot(n, p));
-    h->length[i] = length;
+    set_plane(h, i, plane->n, plane->d);
+    h->length[i] = plane->length;
     h->corner[i][0] = (uint16_t)a;
     h->corner[i][1] = (uint16_t)b;
     h->corner[i][2] = (uint16_t)c;
@@ -103,25 +96,6 @@ static void set_count(hull *h, int count)
 }
 
 /* --- the first four facets --- */
-
-/* Finds the extreme point in each direction w: at[w] is the index of this point. Directions 2*w and
- * 2*w+1 are opposite. Directions 0 to 5 are along the axes, the others along the diagonals. */
-static void find_extremes(const double (*p)[3], int count, int at[EXTREMES])
-{
-    double best[EXTREMES];
-    for (int w = 0; w < EXTREMES; w++)
-        best[w] = -INFINITY, at[w] = 0;
-    for (int i = 0; i < count; i++) {
-        double x = p[i][0], y = p[i][1], z = p[i][2],
-               v[EXTREMES / 2] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z };
-        for (int w = 0; w < EXTREMES / 2; w++) {
-            if (v[w] > best[2 * w])
-                best[2 * w] = v[w], at[2 * w] = i;
-            if (-v[w] > best[2 * w + 1])
-                best[2 * w + 1] = -v[w], at[2 * w + 1] = i;
-        }
-    }
-}
 
 static double distance_squared(const double a[3], const double b[3])
 {
@@ -175,9 +149,13 @@ static bool first_four(const double (*p)[3], int count, const int extremes[EXTRE
 static bool first_facets(hull *h, const int c[4])
 {
     static const int sides[4][3] = { { 0, 1, 2 }, { 0, 3, 1 }, { 1, 3, 2 }, { 2, 3, 0 } };
-    for (int i = 0; i < 4; i++)
-        if (!make_facet(h, i, c[sides[i][0]], c[sides[i][1]], c[sides[i][2]]))
+    for (int i = 0; i < 4; i++) {
+        uint32_t a = (uint32_t)c[sides[i][0]], b = (uint32_t)c[sides[i][1]];
+        ebpo_sweep_plane plane;
+        h->sweep->make_planes(h->p, (const uint32_t[1]){ a << 16 | b }, 1, c[sides[i][2]], &plane);
+        if (!make_facet(h, i, a, b, c[sides[i][2]], &plane))
             return false;
+    }
     set_count(h, 4);
     return true;
 }
@@ -234,6 +212,7 @@ static bool add_point(hull *h, int point)
 {
     uint16_t visible[VISIBLE_MAX];
     uint32_t edges[3 * VISIBLE_MAX], reversed[3 * VISIBLE_MAX];
+    ebpo_sweep_plane plane[3 * VISIBLE_MAX];
     const ebpo_sweep_planes planes = { h->nx, h->ny, h->nz, h->d, (h->count + 3) / 4 };
     int visible_count =
             h->sweep->find_visible(&planes, h->p[point], h->tolerance, flat, visible, VISIBLE_MAX),
@@ -242,14 +221,18 @@ static bool add_point(hull *h, int point)
         return true;
     if (visible_count > VISIBLE_MAX)
         return false;
-    int listed = edges_of(h, visible, visible_count, edges, reversed);
-    for (int i = 0; i < listed; i++) {
-        if (has_edge(edges, (listed + 3) / 4, reversed[i]))
-            continue;
+    int listed = edges_of(h, visible, visible_count, edges, reversed), rim = 0;
+    for (int i = 0; i < listed; i++)
+        if (!has_edge(edges, (listed + 3) / 4, reversed[i]))
+            reversed[rim++] = reversed[i];
+    for (int i = 0; i < rim; i++)
+        edges[i] = reversed[i] << 16 | reversed[i] >> 16;
+    h->sweep->make_planes(h->p, edges, rim, point, plane);
+    for (int i = 0; i < rim; i++) {
         if (made >= visible_count && count == h->capacity)
             return false;
         int index = made < visible_count ? visible[made] : count;
-        if (!make_facet(h, index, (int)(edges[i] >> 16), (int)(edges[i] & 0xffff), point))
+        if (!make_facet(h, index, edges[i] >> 16, edges[i] & 0xffff, point, &plane[i]))
             continue;
         count += made++ >= visible_count;
     }
@@ -283,7 +266,7 @@ int ebpo_hull_facets(const double (*points)[3], int count, double tolerance,
     h.tolerance = tolerance;
     if (count < 4 || capacity < 4 || count > EBPO_HULL_POINTS)
         return 0;
-    find_extremes(points, count, extremes);
+    h.sweep->find_extremes(points, count, extremes);
     if (!first_four(points, count, extremes, corner) || !first_facets(&h, corner))
         return 0;
     grow_hull(&h, count, extremes);

@@ -158,10 +158,11 @@ static ebpo_status split_list(grower *g, ebpo_cell cell, uint64_t at, uint64_t c
     if (!ebpo_array_grow_late(g->b->workspace, &g->mask, &g->mask_capacity, count, 1))
         return no_memory_for_cells(g->error);
     uint64_t sizes[8] = { 0 };
+    const ebpo_sweep_cell prepared = ebpo_octants_prepare(&b->box, cell);
     EBPO_FOR_ITEMS_EVERY(b->workspace, RELEASE_FACES, i, 0, count) {
         ebpo_triangle face;
         ebpo_branch_triangle(b, g->s, g->stack[at + i], &face);
-        unsigned mask = ebpo_octants_visited(&b->box, cell, &face);
+        unsigned mask = ebpo_octants_visited(&prepared, &face);
         g->mask[i] = (uint8_t)mask;
         for (int o = 0; o < 8; o++)
             sizes[o] += mask >> o & 1;
@@ -350,9 +351,10 @@ typedef struct top_split {
 /* Returns a mask of the octants that the face touches. If several octants are possible, an exact
  * test decides. Without this test, a piece could list a face that misses the piece's cell by a
  * rounding error; no leaf of the piece would list this face. */
-static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell, const ebpo_triangle *face)
+static unsigned octants_exactly(const ebpo_builder *b, ebpo_cell cell,
+                                const ebpo_sweep_cell *prepared, const ebpo_triangle *face)
 {
-    unsigned mask = ebpo_octants_visited(&b->box, cell, face);
+    unsigned mask = ebpo_octants_visited(prepared, face);
     if ((mask & (mask - 1)) == 0)
         return mask;
     for (unsigned octant = 0; octant < 8; octant++) {
@@ -377,6 +379,7 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
     top_split *t = context;
     const ebpo_builder *b = t->b;
     uint64_t inside = t->end_vertex - t->first_vertex, *sizes = t->begin[begin / SPLIT_GRAIN];
+    const ebpo_sweep_cell prepared = ebpo_octants_prepare(&b->box, t->cell);
     (void)worker, (void)error;
     memset(sizes, 0, sizeof t->begin[0]);
     EBPO_FOR_ITEMS_SCATTERED(b->workspace, i, begin, end) {
@@ -385,7 +388,7 @@ static ebpo_status make_masks(void *context, uint64_t begin, uint64_t end, unsig
         const uint32_t *f = b->face[t->list[i]];
         bool within = f[0] - t->first_vertex < inside && f[1] - t->first_vertex < inside &&
                       f[2] - t->first_vertex < inside;
-        unsigned mask = octants_exactly(b, t->cell, &face) | (unsigned)!within << 8;
+        unsigned mask = octants_exactly(b, t->cell, &prepared, &face) | (unsigned)!within << 8;
         t->mask[i] = (uint16_t)mask;
         for (; mask; mask &= mask - 1)
             sizes[__builtin_ctz(mask)]++;

@@ -112,9 +112,6 @@ typedef struct ebpo_triangle {
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack);
 
-/* Returns true if the face certainly does not touch the closed cell. */
-bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face);
-
 /* Computes the normal of a face as bits 0 to 19 of a plane code, in coordinates of cells of this
  * root box. Returns false for a face without area. */
 bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal);

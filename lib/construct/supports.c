@@ -183,17 +183,26 @@ static bool is_point(const ebpo_supports *s, unsigned i, const double x[3])
     return p[0][i % 4] == x[0] && p[1][i % 4] == x[1] && p[2][i % 4] == x[2];
 }
 
+/* Returns the hash of a point's coordinates. One round of mixing is enough for three numbers whose
+ * bits are at different positions, and takes a third of the time of ebpo_hash_three. */
+static uint64_t hash_point(const double x[3])
+{
+    uint64_t bits[3];
+    memcpy(bits, x, sizeof bits);
+    return ebpo_hash_number(bits[0] + (bits[1] << 21 | bits[1] >> 43) +
+                            (bits[2] << 42 | bits[2] >> 22));
+}
+
 /* Returns true if there is a point with the coordinates x, and raises the error bound of this point
  * to at least `error`. Otherwise returns false and enters the index of the next point in the table;
  * then the caller must add this point. If the table is half full, returns false and enters nothing.
  */
 static bool known_point(ebpo_supports *s, const double x[3], double error)
 {
-    uint64_t bits[3], at;
+    uint64_t at;
     if (s->count >= s->table_size / 2)
         return false;
-    memcpy(bits, x, sizeof bits);
-    EBPO_HASH_FIND(at, ebpo_hash_three(bits), s->table_size - 1,
+    EBPO_HASH_FIND(at, hash_point(x), s->table_size - 1,
                    !s->table[at] || is_point(s, s->table[at] - 1u, x));
     if (!s->table[at]) {
         s->table[at] = (uint16_t)(s->count + 1);

@@ -1,5 +1,5 @@
-/* Compares a face with a cell: finds the octants of the cell that the face may touch, tests if the
- * face misses the cell, and clips the face to the cell.
+/* Compares a face with a cell: finds the octants of the cell that the face may touch, and clips the
+ * face to the cell.
  *
  * All tests use a bound of the rounding error and are conservative, so no exact arithmetic is
  * needed. A test may keep a face that does not touch the cell, but it never drops a face that
@@ -11,9 +11,11 @@
 #include "core/strict_fp.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "construct/construct_stages.h"
 #include "construct/planes.h"
+#include "construct/sweep.h"
 #include "geometry/polytope.h"
 #include "geometry/vec3.h"
 
@@ -26,7 +28,7 @@ static double to_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *
     double greatest = 1;
     for (int k = 0; k < 3; k++) {
         double corner = ebpo_cell_face(box, k, cell.level, cell.at[k]);
-        double size = box->size[k] / (double)(1u << cell.level);
+        double size = box->size[k] * ebpo_half_power(cell.level);
         for (int i = 0; i < 3; i++) {
             x[i][k] = (face->corner[i][k] - corner) / size;
             double a = fabs(x[i][k]);
@@ -72,128 +74,67 @@ static int clip_cell_face(double in[9][3], int count, int axis, double sign, dou
     return kept;
 }
 
+static void swap_buffers(double (**a)[3], double (**b)[3])
+{
+    double(*c)[3] = *a;
+    *a = *b;
+    *b = c;
+}
+
 int ebpo_clip_triangle(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face,
                        double points[9][3], double *slack)
 {
-    double x[3][3], buffer[9][3], e = slack_for(to_cell(box, cell, face, x));
+    double x[3][3], buffer[9][3], (*at)[3] = points, (*other)[3] = buffer,
+                                  e = slack_for(to_cell(box, cell, face, x));
     *slack = e;
     int count = 3;
     for (int i = 0; i < 3; i++)
         for (int k = 0; k < 3; k++)
             points[i][k] = x[i][k];
     for (int k = 0; k < 3; k++) {
-        double low = fmin(x[0][k], fmin(x[1][k], x[2][k])),
-               high = fmax(x[0][k], fmax(x[1][k], x[2][k]));
+        double low = ebpo_min3(x[0][k], x[1][k], x[2][k]),
+               high = ebpo_max3(x[0][k], x[1][k], x[2][k]);
         if (low > 1 + e || high < -e)
             return 0;
         if (high <= 1 + e && low >= -e)
             continue;
-        int n = clip_cell_face(points, count, k, 1, 1 + e, buffer);
-        count = clip_cell_face(buffer, n, k, -1, e, points);
+        /* A corner that an earlier clip made may be beyond the face's bounds, but by less than e.
+         * So a clip at a cell face that the bounds do not cross changes nothing, and is omitted. */
+        if (high > 1)
+            count = clip_cell_face(at, count, k, 1, 1 + e, other), swap_buffers(&at, &other);
+        if (low < 0)
+            count = clip_cell_face(at, count, k, -1, e, other), swap_buffers(&at, &other);
     }
+    if (at != points)
+        memcpy(points, at, (size_t)count * sizeof *points);
     return count;
 }
 
-/* A face in cell coordinates, for tests of separating axes: corners, edges and normal. */
-typedef struct separation {
-    double x[3][3], edge[3][3], normal[3];
-    double greatest; /* greatest absolute coordinate, at least 1 */
-} separation;
-
-/* Computes the edges and the normal from the corners. */
-static void separation_prepare(separation *s)
+ebpo_sweep_cell ebpo_octants_prepare(const ebpo_box *box, ebpo_cell cell)
 {
-    for (int i = 0; i < 3; i++)
-        ebpo_vec3_subtract(s->x[(i + 1) % 3], s->x[i], s->edge[i]);
-    ebpo_vec3_cross(s->edge[0], s->edge[1], s->normal);
+    ebpo_sweep_cell out;
+    for (int lane = 0; lane < 4; lane++) {
+        int k = lane < 3 ? lane : 2;
+        out.low[lane] = ebpo_cell_face(box, k, cell.level, cell.at[k]);
+        out.centre[lane] = ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1);
+        out.size[lane] = box->size[k] * ebpo_half_power(cell.level);
+    }
+    return out;
 }
 
-/* Returns true if a plane separates the face from the cube around `centre` whose sides have the
- * length 2 * half. Two kinds of planes are tested: the plane of the face, and planes whose normal
- * is the cross product of an edge of the face with an axis. Let M be the greatest coordinate and u
- * = 2^-53. The rounding errors are at most 4 u M for edges, 64 u M^2 for cross products, and 512 u
- * M^3 for the plane. The tolerances in this function are at least as large. */
-static bool is_separated(const separation *s, const double centre[3], double half)
+unsigned ebpo_octants_visited(const ebpo_sweep_cell *cell, const ebpo_triangle *face)
 {
-    double m = s->greatest, tolerance = 0x1p-44 * m * m * m;
-    double distance = 0, radius = 0;
-    for (int k = 0; k < 3; k++) {
-        distance += s->normal[k] * (s->x[0][k] - centre[k]);
-        radius += fabs(s->normal[k]);
-    }
-    if (fabs(distance) > half * radius + tolerance)
-        return true;
-    tolerance = 0x1p-46 * m * m;
-    for (int i = 0; i < 3; i++) {
-        const double *p = s->x[i], *q = s->x[(i + 2) % 3], *e = s->edge[i];
-        for (int k = 0; k < 3; k++) {
-            int a = (k + 1) % 3, b = (k + 2) % 3;
-            double dp = e[a] * (p[b] - centre[b]) - e[b] * (p[a] - centre[a]);
-            double dq = e[a] * (q[b] - centre[b]) - e[b] * (q[a] - centre[a]);
-            double r = half * (fabs(e[a]) + fabs(e[b])) + tolerance;
-            if ((dp > r && dq > r) || (dp < -r && dq < -r))
-                return true;
-        }
-    }
-    return false;
-}
-
-/* Returns a mask of the octants that the face's bounding box touches. The face's coordinates are
- * compared with the exact coordinates of the planes between the octants. */
-static unsigned octants_of_bounds(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
-{
-    static const unsigned low_side[3] = { 0x55, 0x33, 0x0f };
-    unsigned mask = 255;
-    for (int k = 0; k < 3; k++) {
-        double cell_face = ebpo_cell_face(box, k, cell.level + 1, 2 * cell.at[k] + 1),
-               a = face->corner[0][k], b = face->corner[1][k], c = face->corner[2][k];
-        if (a > cell_face && b > cell_face && c > cell_face)
-            mask &= ~low_side[k];
-        if (a < cell_face && b < cell_face && c < cell_face)
-            mask &= low_side[k];
-    }
-    return mask;
-}
-
-unsigned ebpo_octants_visited(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
-{
-    unsigned mask = octants_of_bounds(box, cell, face);
-    if ((mask & (mask - 1)) == 0)
-        return mask;
-    separation s;
-    s.greatest = to_cell(box, cell, face, s.x);
-    separation_prepare(&s);
-    for (unsigned octant = 0; octant < 8; octant++) {
-        if (!(mask >> octant & 1))
-            continue;
-        double centre[3];
-        for (int k = 0; k < 3; k++)
-            centre[k] = octant >> k & 1 ? 0.75 : 0.25;
-        if (is_separated(&s, centre, 0.25))
-            mask &= ~(1u << octant);
-    }
-    return mask;
-}
-
-bool ebpo_triangle_misses_cell(const ebpo_box *box, ebpo_cell cell, const ebpo_triangle *face)
-{
-    separation s;
-    s.greatest = to_cell(box, cell, face, s.x);
-    double e = slack_for(s.greatest);
-    for (int k = 0; k < 3; k++)
-        if (fmin(s.x[0][k], fmin(s.x[1][k], s.x[2][k])) > 1 + e ||
-            fmax(s.x[0][k], fmax(s.x[1][k], s.x[2][k])) < -e)
-            return true;
-    separation_prepare(&s);
-    return is_separated(&s, (const double[3]){ 0.5, 0.5, 0.5 }, 0.5);
+    return ebpo_sweep_best()->find_octants(cell, face->corner);
 }
 
 bool ebpo_face_normal_code(const ebpo_box *box, const ebpo_triangle *face, uint32_t *normal)
 {
     /* every cell has the shape of the root box, so the normal in the root's coordinates is the
      * normal in any cell's coordinates */
-    separation s;
-    s.greatest = to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, s.x);
-    separation_prepare(&s);
-    return ebpo_plane_code_normal(s.normal, normal);
+    double x[3][3], edge[2][3], direction[3];
+    (void)to_cell(box, (ebpo_cell){ 0, { 0, 0, 0 } }, face, x);
+    ebpo_vec3_subtract(x[1], x[0], edge[0]);
+    ebpo_vec3_subtract(x[2], x[1], edge[1]);
+    ebpo_vec3_cross(edge[0], edge[1], direction);
+    return ebpo_plane_code_normal(direction, normal);
 }

@@ -1,9 +1,10 @@
 /* Sorts records in three passes. The records may be larger than the memory. The first pass makes
- * the records. The second pass distributes the records to groups by the leading bits of their keys.
- * The third pass sorts each group in memory, by the digits of the keys; the caller's comparison
- * orders records with equal keys. A pass reads and writes an array either from begin to end, or in
- * each group from the group's begin to its end. With such sequential access, a workspace can keep
- * the arrays in files. The result depends neither on the number of threads nor on memory. */
+ * the records and counts them by the leading bits of their keys. The second pass makes them again,
+ * because storing them would take longer if they are in a file, and distributes them to groups by
+ * these bits. The third pass sorts each group in memory, by the digits of the keys; the caller's
+ * comparison orders records with equal keys. A pass writes and reads the array of groups in each
+ * group from the group's begin to its end. With such sequential access, a workspace can keep this
+ * array in a file. The result depends neither on the number of threads nor on memory. */
 #include "core/sort.h"
 
 #include <stdlib.h>
@@ -28,7 +29,6 @@ enum {
 /* State of a sort. A bin is a value of the leading bits of a key. */
 typedef struct sorting {
     const ebpo_sort *s;
-    uint8_t *made;      /* records in the order in which the caller made them */
     uint8_t *dealt;     /* records in the order of their groups */
     uint64_t *first;    /* [groups + 1] first record of each group in `dealt` */
     uint64_t *next;     /* [groups] position in `dealt` of the group's next records */
@@ -44,16 +44,27 @@ static uint64_t key_of(const uint8_t *record)
     return key;
 }
 
-static ebpo_status make_records(void *context, uint64_t begin, uint64_t end, unsigned worker,
-                                ebpo_error *error)
+/* Allocates memory for the records [begin, end), and makes them. The caller must free *out. */
+static ebpo_status make_some(const ebpo_sort *s, uint64_t begin, uint64_t end, uint8_t **out,
+                             ebpo_error *error)
+{
+    *out = ebpo_alloc(end - begin, s->record);
+    return *out ? s->make(s->context, begin, end, *out, error)
+                : ebpo_fail_memory(error, (end - begin) * s->record);
+}
+
+static ebpo_status count_records(void *context, uint64_t begin, uint64_t end, unsigned worker,
+                                 ebpo_error *error)
 {
     sorting *t = context;
     const ebpo_sort *s = t->s;
     (void)worker;
-    uint8_t *made = t->made + begin * s->record;
-    ebpo_status status = s->make(s->context, begin, end, made, error);
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i++, made += s->record)
-        __atomic_fetch_add(&t->in_bin[key_of(made) >> s->shift], 1, __ATOMIC_RELAXED);
+    uint8_t *made;
+    ebpo_status status = make_some(s, begin, end, &made, error);
+    for (uint64_t i = 0; i < end - begin && status == EBPO_OK; i++)
+        __atomic_fetch_add(&t->in_bin[key_of(made + i * s->record) >> s->shift], 1,
+                           __ATOMIC_RELAXED);
+    free(made);
     return status;
 }
 
@@ -83,9 +94,10 @@ static bool form_groups(sorting *t)
     return t->next != NULL;
 }
 
-/* Distributes the made records [begin, end) to the groups. First copies the records to `grouped`,
- * ordered by group; `grouped` fits in the core's cache. Then copies the records of each group to
- * `dealt` with one memcpy. So a thread writes to `dealt` at only one position at a time. */
+/* Makes the records [begin, end) and distributes them to the groups. First copies the records to
+ * `grouped`, ordered by group; `grouped` fits in the core's cache. Then copies the records of each
+ * group to `dealt` with one memcpy. So a thread writes to `dealt` at only one position at a time.
+ */
 static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
@@ -98,10 +110,16 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
     uint64_t cursor[GROUPS_MAX * 2], at = 0;
     (void)worker;
     memset(cursor, 0, (size_t)t->groups * sizeof *cursor);
-    uint8_t *grouped = ebpo_alloc(end - begin, s->record);
-    if (!grouped)
-        return ebpo_fail_memory(error, (end - begin) * s->record);
-    const uint8_t *from = t->made + begin * s->record;
+    uint8_t *made, *grouped = ebpo_alloc(end - begin, s->record);
+    ebpo_status status = make_some(s, begin, end, &made, error);
+    if (status == EBPO_OK && !grouped)
+        status = ebpo_fail_memory(error, (end - begin) * s->record);
+    if (status != EBPO_OK) {
+        free(made);
+        free(grouped);
+        return status;
+    }
+    const uint8_t *from = made;
     for (uint64_t i = begin; i < end; i++, from += s->record)
         cursor[t->group_of[key_of(from) >> s->shift]]++;
     for (uint64_t g = 0; g < t->groups; g++) {
@@ -109,7 +127,7 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
         cursor[g] = at;
         at += count;
     }
-    from = t->made + begin * s->record;
+    from = made;
     for (uint64_t i = begin; i < end; i++, from += s->record)
         memcpy(grouped + cursor[t->group_of[key_of(from) >> s->shift]]++ * s->record, from,
                s->record);
@@ -123,6 +141,7 @@ static ebpo_status deal_to_groups(void *context, uint64_t begin, uint64_t end, u
         if (++runs % RELEASE_EVERY == 0)
             ebpo_release_pages(s->workspace);
     }
+    free(made);
     free(grouped);
     return EBPO_OK;
 }
@@ -272,7 +291,7 @@ static ebpo_status run_passes(sorting *t, ebpo_error *error)
     ebpo_pass pass = { s->progress, s->passes_before, s->passes_before + 1,
                        s->passes_before + EBPO_SORT_PASSES };
     ebpo_progress progress = ebpo_pass_progress(&pass);
-    ebpo_status status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, make_records,
+    ebpo_status status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, count_records,
                                            t, &progress, s->stage, error);
     pass.begin = pass.end++;
     if (status == EBPO_OK && !form_groups(t))
@@ -280,8 +299,6 @@ static ebpo_status run_passes(sorting *t, ebpo_error *error)
     if (status == EBPO_OK)
         status = ebpo_parallel_for(s->threads, s->workspace, s->count, GRAIN, deal_to_groups, t,
                                    &progress, s->stage, error);
-    ebpo_array_free(s->workspace, t->made);
-    t->made = NULL;
     pass.begin = pass.end++;
     if (status == EBPO_OK)
         status = ebpo_parallel_for(threads_for_groups(t), s->workspace, t->groups, 1, sort_groups,
@@ -295,20 +312,18 @@ ebpo_status ebpo_sort_run(const ebpo_sort *sort, ebpo_error *error)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "records of %zu bytes are too large to sort",
                          sort->record);
     sorting t = { .s = sort };
-    uint64_t bytes = sort->count * sort->record;
     if (sort->count <= ALONE_MAX) {
         ebpo_status status = run_alone(&t, error);
         free(t.dealt);
         return status;
     }
-    t.made = ebpo_array_alloc(sort->workspace, sort->count, sort->record);
     t.dealt = ebpo_array_alloc(sort->workspace, sort->count, sort->record);
     t.group_of = ebpo_alloc(EBPO_SORT_BINS, sizeof *t.group_of);
     t.in_bin = ebpo_alloc_zero(EBPO_SORT_BINS, sizeof *t.in_bin);
-    ebpo_status status = t.made && t.dealt && t.group_of && t.in_bin
-                             ? run_passes(&t, error)
-                             : ebpo_workspace_fail(sort->workspace, 2 * bytes, error);
-    ebpo_array_free(sort->workspace, t.made);
+    ebpo_status status =
+        t.dealt && t.group_of && t.in_bin
+            ? run_passes(&t, error)
+            : ebpo_workspace_fail(sort->workspace, sort->count * sort->record, error);
     ebpo_array_free(sort->workspace, t.dealt);
     free(t.first);
     free(t.next);

@@ -36,10 +36,20 @@ bool ebpo_plane_code_decode(uint32_t code, int32_t n[3], int32_t *d)
     return true;
 }
 
+/* Returns the greatest integer that is at most x. |x| must be below 2^31. (On machines without an
+ * instruction for this, floor() is a function of the C library, which takes longer.) */
+static int32_t floor_of(double x)
+{
+    int32_t i = (int32_t)x;
+    return i - (x < i);
+}
+
 bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal)
 {
     double x = direction[0], y = direction[1], z = direction[2];
-    double most = fmax(fabs(x), fmax(fabs(y), fabs(z)));
+    /* most may be wrong if a coordinate is not a number, but then the sum of the coordinates is not
+     * finite */
+    double most = ebpo_max3(fabs(x), fabs(y), fabs(z));
     if (!(most > 0) || !isfinite(most) || !isfinite(x + y + z))
         return false;
     x /= most, y /= most, z /= most; /* prevents overflow and underflow of the sum below */
@@ -50,7 +60,7 @@ bool ebpo_plane_code_normal(const double direction[3], uint32_t *normal)
         double fv = (EBPO_NORMAL_NORM - fabs(u)) * (v < 0 ? -1 : 1);
         u = fu, v = fv;
     }
-    int32_t iu = (int32_t)floor(u + 0.5), iv = (int32_t)floor(v + 0.5);
+    int32_t iu = floor_of(u + 0.5), iv = floor_of(v + 0.5);
     iu = iu < -EBPO_NORMAL_NORM ? -EBPO_NORMAL_NORM : iu > EBPO_NORMAL_NORM ? EBPO_NORMAL_NORM : iu;
     iv = iv < -EBPO_NORMAL_NORM ? -EBPO_NORMAL_NORM : iv > EBPO_NORMAL_NORM ? EBPO_NORMAL_NORM : iv;
     *normal = (uint32_t)(iu + EBPO_NORMAL_NORM) | (uint32_t)(iv + EBPO_NORMAL_NORM) << 10;
@@ -64,10 +74,10 @@ int ebpo_plane_code_offset(const int32_t n[3], double support)
         least += n[i] < 0 ? n[i] : 0;
     /* The values are below 2^21 and have relative errors of a few 2^-53. So the error is less than
      * 1e-8 steps. */
-    double q = ceil((support - least) * ((double)EBPO_OFFSET_STEPS / EBPO_NORMAL_NORM) + 1e-8) - 1;
-    if (!(q < EBPO_OFFSET_STEPS - 1))
+    double steps = (support - least) * ((double)EBPO_OFFSET_STEPS / EBPO_NORMAL_NORM) + 1e-8;
+    if (!(steps <= EBPO_OFFSET_STEPS - 1))
         return -1;
-    return q < 0 ? 0 : (int)q;
+    return steps <= 0 ? 0 : -floor_of(-steps) - 1;
 }
 
 /* --- polytopes and volumes --- */
@@ -92,6 +102,17 @@ void ebpo_polytope_cube(ebpo_polytope *p)
         memcpy(p->corner + 4 * f, loops[f], sizeof loops[f]);
     }
     p->first[6] = 24;
+}
+
+void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
+{
+    to->vertex_count = from->vertex_count;
+    to->face_count = from->face_count;
+    to->corner_count = from->corner_count;
+    memcpy(to->vertex, from->vertex, (size_t)from->vertex_count * sizeof from->vertex[0]);
+    memcpy(to->tag, from->tag, (size_t)from->face_count * sizeof from->tag[0]);
+    memcpy(to->first, from->first, (size_t)(from->face_count + 1) * sizeof from->first[0]);
+    memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
 }
 
 double ebpo_polytope_volume(const ebpo_polytope *p)
@@ -139,11 +160,12 @@ double ebpo_polytope_cap_bound(double volume, double width, double height)
  * has no volume. */
 typedef struct beyond {
     const ebpo_polytope *p;
-    double dist[EBPO_POLYTOPE_VERTICES]; /* signed distance of each vertex; positive: beyond */
-    double fans;                         /* six times the volume of the pyramids on the faces */
-    double area[3];                      /* twice the area of the cut, as a vector */
-    double origin[3];                    /* a point of the cut, valid if `started` */
-    int farthest;                        /* vertex with the greatest distance */
+    double dist[EBPO_POLYTOPE_VERTICES];  /* signed distance of each vertex; positive: beyond */
+    bool outside[EBPO_POLYTOPE_VERTICES]; /* true if the vertex is beyond the plane */
+    double fans;                          /* six times the volume of the pyramids on the faces */
+    double area[3];                       /* twice the area of the cut, as a vector */
+    double origin[3];                     /* a point of the cut, valid if `started` */
+    int farthest;                         /* vertex with the greatest distance */
     bool started;
 } beyond;
 
@@ -195,7 +217,7 @@ static void face_beyond(beyond *c, int f)
     int count = p->first[f + 1] - p->first[f], outside = 0, kept = 0;
     bool fan = true;
     for (int i = 0; i < count; i++) {
-        outside += c->dist[loop[i]] > 0;
+        outside += c->outside[loop[i]];
         fan &= loop[i] != c->farthest;
     }
     if (!outside)
@@ -204,7 +226,7 @@ static void face_beyond(beyond *c, int f)
            last[3] = { 0, 0, 0 };
     for (int i = 0, a = loop[count - 1]; i < count; a = loop[i++]) {
         int b = loop[i];
-        bool a_out = c->dist[a] > 0, b_out = c->dist[b] > 0;
+        bool a_out = c->outside[a], b_out = c->outside[b];
         if (a_out != b_out) {
             point_between(c, a_out ? a : b, a_out ? b : a, a_out ? leave : enter);
             if (fan)
@@ -227,6 +249,7 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
     for (int i = 0; i < p->vertex_count; i++) {
         double e = ebpo_vec3_dot(n, p->vertex[i]) - d;
         c.dist[i] = e;
+        c.outside[i] = e > 0;
         low = e < low ? e : low;
         if (e > high)
             high = e, c.farthest = i;
@@ -243,12 +266,18 @@ double ebpo_polytope_removed(const ebpo_polytope *p, const double n[3], double d
 
 /* --- clipping --- */
 
+/* Positions of a vertex relative to the cutting plane, as bits, so that a face has the bits of all
+ * its vertices. */
+enum { VERTEX_KEPT = 1, VERTEX_ON = 2, VERTEX_REMOVED = 4 };
+
 typedef struct cut {
     const ebpo_polytope *in;
+    const double (*x)[3]; /* coordinates of the vertices of `in`; used in place of in->vertex */
     ebpo_polytope *out;
     double dist[EBPO_POLYTOPE_VERTICES]; /* signed distance of each vertex of `in` from the plane;
                                             positive: removed */
-    uint16_t number[EBPO_POLYTOPE_VERTICES]; /* indices of kept vertices in `out` */
+    uint8_t position[EBPO_POLYTOPE_VERTICES]; /* VERTEX_KEPT etc. of each vertex of `in` */
+    uint16_t number[EBPO_POLYTOPE_VERTICES];  /* indices of kept vertices in `out` */
     bool on[EBPO_POLYTOPE_VERTICES]; /* true if the vertex of `out` is on the cutting plane */
     /* edges that the plane crosses. edge.in, edge.out: the kept and the removed vertex, as indices
      * in the polytope `in`; number: index of the new vertex in the polytope `out` */
@@ -282,8 +311,8 @@ static uint16_t add_vertex(cut *c, const double x[3], bool on)
  * removed vertex `out`. */
 static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
 {
-    if (c->dist[in] >= -tolerance)
-        return c->number[in]; /* the inner end is on the plane */
+    if (c->position[in] == VERTEX_ON)
+        return c->number[in];
     for (int i = 0; i < c->edges; i++)
         if (c->edge[i].in == in && c->edge[i].out == out)
             return c->edge[i].number;
@@ -292,7 +321,7 @@ static uint16_t crossing_vertex(cut *c, uint16_t in, uint16_t out)
         return 0;
     }
     double x[3];
-    interpolate_crossing(c->in->vertex[in], c->dist[in], c->in->vertex[out], c->dist[out], x);
+    interpolate_crossing(c->x[in], c->dist[in], c->x[out], c->dist[out], x);
     uint16_t number = add_vertex(c, x, true);
     c->edge[c->edges].in = in;
     c->edge[c->edges].out = out;
@@ -332,25 +361,48 @@ static void close_face(cut *c, int start, int32_t tag)
     o->first[o->face_count] = (uint16_t)o->corner_count;
 }
 
-static void clip_face(cut *c, int f)
+/* Adds the loop of a face with at least one removed vertex. */
+static void clip_loop(cut *c, const uint16_t *loop, int count, int start)
 {
-    const ebpo_polytope *p = c->in;
-    const uint16_t *loop = p->corner + p->first[f];
-    int count = p->first[f + 1] - p->first[f], start = c->out->corner_count;
-    bool inside = false;
-    for (int i = 0; i < count; i++)
-        inside |= c->dist[loop[i]] < -tolerance;
-    if (!inside)
-        return;
     for (int i = 0; i < count; i++) {
         uint16_t a = loop[i], b = loop[i + 1 < count ? i + 1 : 0];
-        bool a_out = c->dist[a] > tolerance, b_out = c->dist[b] > tolerance;
+        bool a_out = c->position[a] == VERTEX_REMOVED, b_out = c->position[b] == VERTEX_REMOVED;
         if (!a_out)
             add_corner(c, start, c->number[a]);
         if (a_out != b_out)
             add_corner(c, start, a_out ? crossing_vertex(c, b, a) : crossing_vertex(c, a, b));
     }
+}
+
+/* Adds the loop of a face without removed vertices. */
+static void copy_loop(cut *c, const uint16_t *loop, int count)
+{
+    ebpo_polytope *o = c->out;
+    if (o->corner_count + count > EBPO_POLYTOPE_CORNERS) {
+        c->full = true;
+        return;
+    }
+    for (int i = 0; i < count; i++)
+        o->corner[o->corner_count++] = c->number[loop[i]];
+}
+
+static void clip_face(cut *c, int f)
+{
+    const ebpo_polytope *p = c->in;
+    const uint16_t *loop = p->corner + p->first[f];
+    int count = p->first[f + 1] - p->first[f], start = c->out->corner_count;
+    unsigned positions = 0;
+    for (int i = 0; i < count; i++)
+        positions |= c->position[loop[i]];
+    if (!(positions & VERTEX_KEPT))
+        return;
+    if (positions & VERTEX_REMOVED)
+        clip_loop(c, loop, count, start);
+    else
+        copy_loop(c, loop, count);
     close_face(c, start, p->tag[f]);
+    if (positions == VERTEX_KEPT)
+        return; /* no corner is on the plane */
     for (int i = start; i < c->out->corner_count && !c->full; i++) {
         uint16_t a = c->out->corner[i],
                  b = c->out->corner[i + 1 < c->out->corner_count ? i + 1 : start];
@@ -396,18 +448,15 @@ static bool close_cap(cut *c, int32_t tag)
     return true;
 }
 
-ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag)
+/* Makes c->out from c->in, c->x and c->dist. Returns EBPO_CLIP_CUT; or returns another value, and
+ * the contents of c->out are undefined. */
+static ebpo_clip make_cut(cut *c, int32_t tag)
 {
-    cut c;
-    ebpo_polytope out;
-    c.in = p;
-    c.out = &out;
-    c.edges = c.rims = 0;
-    c.full = c.touched = false;
+    const ebpo_polytope *p = c->in;
+    ebpo_polytope *o = c->out;
     double most = -1e300, least = 1e300;
     for (int i = 0; i < p->vertex_count; i++) {
-        double e = ebpo_vec3_dot(n, p->vertex[i]) - d;
-        c.dist[i] = e;
+        double e = c->dist[i];
         most = e > most ? e : most;
         least = e < least ? e : least;
     }
@@ -415,66 +464,68 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
         return EBPO_CLIP_NONE;
     if (least >= -1e-7) /* almost nothing would remain */
         return EBPO_CLIP_REFUSED;
-    out.vertex_count = out.face_count = out.corner_count = 0;
-    out.first[0] = 0;
-    for (int i = 0; i < p->vertex_count; i++)
-        if (c.dist[i] <= tolerance) {
-            bool on = c.dist[i] >= -tolerance;
-            c.number[i] = add_vertex(&c, p->vertex[i], on);
-            c.touched |= on;
-        }
-    for (int f = 0; f < p->face_count && !c.full; f++)
-        clip_face(&c, f);
-    if (c.full || !close_cap(&c, tag) || c.full || out.face_count < 4)
-        return EBPO_CLIP_REFUSED;
-    memcpy(p->vertex, out.vertex, (size_t)out.vertex_count * sizeof out.vertex[0]);
-    memcpy(p->tag, out.tag, (size_t)out.face_count * sizeof out.tag[0]);
-    memcpy(p->first, out.first, (size_t)(out.face_count + 1) * sizeof out.first[0]);
-    memcpy(p->corner, out.corner, (size_t)out.corner_count * sizeof out.corner[0]);
-    p->vertex_count = out.vertex_count;
-    p->face_count = out.face_count;
-    p->corner_count = out.corner_count;
-    return EBPO_CLIP_CUT;
+    c->edges = c->rims = 0;
+    c->full = c->touched = false;
+    o->vertex_count = o->face_count = o->corner_count = 0;
+    o->first[0] = 0;
+    for (int i = 0; i < p->vertex_count; i++) {
+        bool removed = c->dist[i] > tolerance, on = !removed && c->dist[i] >= -tolerance;
+        c->position[i] = removed ? VERTEX_REMOVED : on ? VERTEX_ON : VERTEX_KEPT;
+        c->touched |= on;
+        if (!removed)
+            c->number[i] = add_vertex(c, c->x[i], on);
+    }
+    for (int f = 0; f < p->face_count && !c->full; f++)
+        clip_face(c, f);
+    return c->full || !close_cap(c, tag) || c->full || o->face_count < 4 ? EBPO_CLIP_REFUSED
+                                                                         : EBPO_CLIP_CUT;
 }
 
-void ebpo_polytope_copy(ebpo_polytope *to, const ebpo_polytope *from)
+ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int32_t tag)
 {
-    to->vertex_count = from->vertex_count;
-    to->face_count = from->face_count;
-    to->corner_count = from->corner_count;
-    memcpy(to->vertex, from->vertex, (size_t)from->vertex_count * sizeof from->vertex[0]);
-    memcpy(to->tag, from->tag, (size_t)from->face_count * sizeof from->tag[0]);
-    memcpy(to->first, from->first, (size_t)(from->face_count + 1) * sizeof from->first[0]);
-    memcpy(to->corner, from->corner, (size_t)from->corner_count * sizeof from->corner[0]);
+    cut c;
+    ebpo_polytope out;
+    c.in = p;
+    c.x = (const double(*)[3])p->vertex;
+    c.out = &out;
+    for (int i = 0; i < p->vertex_count; i++)
+        c.dist[i] = ebpo_vec3_dot(n, p->vertex[i]) - d;
+    ebpo_clip clip = make_cut(&c, tag);
+    if (clip == EBPO_CLIP_CUT)
+        ebpo_polytope_copy(p, &out);
+    return clip;
 }
 
 /* --- halves and children --- */
 
-/* Same as ebpo_polytope_half, in place. */
-static bool halve_in_place(ebpo_polytope *p, int axis, int side)
-{
-    double n[3] = { 0, 0, 0 };
-    n[axis] = side ? -1 : 1;
-    for (int i = 0; i < p->vertex_count; i++)
-        p->vertex[i][axis] = 2 * p->vertex[i][axis] - side;
-    if (ebpo_polytope_clip(p, n, side ? 0 : 1, -1 - (2 * axis + !side)) != EBPO_CLIP_REFUSED)
-        return true;
-    ebpo_polytope_cube(p);
-    return false;
-}
-
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
 {
-    ebpo_polytope_copy(out, p);
-    return halve_in_place(out, axis, side);
+    cut c;
+    double scaled[EBPO_POLYTOPE_VERTICES][3];
+    c.in = p;
+    c.x = (const double(*)[3])scaled;
+    c.out = out;
+    memcpy(scaled, p->vertex, (size_t)p->vertex_count * sizeof *scaled);
+    for (int i = 0; i < p->vertex_count; i++) {
+        double x = 2 * p->vertex[i][axis] - side;
+        scaled[i][axis] = x;
+        c.dist[i] = side ? -x : x - 1;
+    }
+    ebpo_clip clip = make_cut(&c, -1 - (2 * axis + !side));
+    if (clip == EBPO_CLIP_NONE) {
+        ebpo_polytope_copy(out, p);
+        memcpy(out->vertex, scaled, (size_t)p->vertex_count * sizeof *scaled);
+    } else if (clip == EBPO_CLIP_REFUSED)
+        ebpo_polytope_cube(out);
+    return clip != EBPO_CLIP_REFUSED;
 }
 
 bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope *out)
 {
-    ebpo_polytope_copy(out, p);
-    bool not_empty = halve_in_place(out, 2, octant >> 2 & 1);
-    not_empty = halve_in_place(out, 1, octant >> 1 & 1) && not_empty;
-    return halve_in_place(out, 0, octant & 1) && not_empty;
+    ebpo_polytope quarter;
+    bool not_empty = ebpo_polytope_half(p, 2, octant >> 2 & 1, out);
+    not_empty = ebpo_polytope_half(out, 1, octant >> 1 & 1, &quarter) && not_empty;
+    return ebpo_polytope_half(&quarter, 0, octant & 1, out) && not_empty;
 }
 
 void ebpo_polytope_sides(const ebpo_polytope *p, uint8_t sides[EBPO_POLYTOPE_VERTICES])

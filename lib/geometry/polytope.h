@@ -102,7 +102,7 @@ bool ebpo_polytope_child(const ebpo_polytope *p, unsigned octant, ebpo_polytope 
 
 /* Sets *out to the part of p in one half along `axis` (side 0: lower, 1: upper), scaled to the unit
  * cube. ebpo_polytope_child halves along z, then y, then x. When the part is empty up to rounding,
- * returns false and sets *out to the whole cube. */
+ * returns false and sets *out to the whole cube. `out` may not be `p`. */
 bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out);
 
 /* Copies only the used part of the struct. */

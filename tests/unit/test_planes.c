@@ -2,11 +2,14 @@
  * that sample or enumerate. */
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "check_main.h"
 #include "geometry/polytope.h"
 #include "construct/construct_stages.h"
 #include "construct/planes.h"
+#include "construct/sweep.h"
+#include "geometry/vec3.h"
 #include "solids.h"
 
 static const double shapes[][6] = { { 0, 0, 0, 1, 1, 1 },
@@ -71,7 +74,8 @@ START_TEST(test_octants_intersected_by_face_are_found)
             ebpo_triangle t = random_face(&box, &seed, i % 2);
             ebpo_cell cell = { 0, { 0, 0, 0 } };
             for (int depth = 0; depth < 6; depth++) {
-                unsigned mask = ebpo_octants_visited(&box, cell, &t);
+                const ebpo_sweep_cell prepared = ebpo_octants_prepare(&box, cell);
+                unsigned mask = ebpo_octants_visited(&prepared, &t);
                 for (int j = 0; j < 8; j++) {
                     double p[3];
                     point_of(&t, &seed, p);
@@ -79,11 +83,9 @@ START_TEST(test_octants_intersected_by_face_are_found)
                         ebpo_cell child = { cell.level + 1, { 0, 0, 0 } };
                         for (unsigned k = 0; k < 3; k++)
                             child.at[k] = cell.at[k] * 2 + (o >> k & 1);
-                        if (clearly_in(&box, child, p)) {
+                        if (clearly_in(&box, child, p))
                             ck_assert_msg(mask >> o & 1, "octant %u missed at level %d", o,
                                           cell.level);
-                            ck_assert(!ebpo_triangle_misses_cell(&box, child, &t));
-                        }
                     }
                 }
                 if (!mask)
@@ -102,11 +104,12 @@ START_TEST(test_octants_far_from_face_are_omitted)
 {
     ebpo_box box = box_of(0, 10);
     ebpo_triangle t = { { { 0.1, 0.1, 0.1 }, { 0.2, 0.1, 0.1 }, { 0.1, 0.2, 0.1 } } };
-    ck_assert_uint_eq(ebpo_octants_visited(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &t), 1);
+    const ebpo_sweep_cell root = ebpo_octants_prepare(&box, (ebpo_cell){ 0, { 0, 0, 0 } });
+    ck_assert_uint_eq(ebpo_octants_visited(&root, &t), 1);
     /* A slanted face whose box intersects all octants, and which cuts off one corner of the cube.
      */
     ebpo_triangle slanted = { { { 0.9, 0, 0 }, { 0, 0.9, 0 }, { 0, 0, 0.9 } } };
-    unsigned mask = ebpo_octants_visited(&box, (ebpo_cell){ 0, { 0, 0, 0 } }, &slanted);
+    unsigned mask = ebpo_octants_visited(&root, &slanted);
     ck_assert_uint_eq(mask, 0x17);
 }
 END_TEST
@@ -243,6 +246,164 @@ START_TEST(test_lazy_greedy_matches_plain_greedy)
 }
 END_TEST
 
+/* --- the kernels of sweep.h, with the same bits as plain loops --- */
+
+static const ebpo_sweep *sweeps(int i)
+{
+#if defined(__x86_64__) && !defined(EBPO_BASE_KERNELS_ONLY)
+    return i == 0 ? &ebpo_sweep_base : i == 1 && ebpo_cpu_has_v3() ? &ebpo_sweep_v3 : NULL;
+#else
+    return i == 0 ? &ebpo_sweep_base : NULL;
+#endif
+}
+
+/* Returns true if a plane separates the face from an octant. x: corners in cell coordinates. */
+static bool is_separated(const double x[3][3], unsigned octant)
+{
+    double edge[3][3], normal[3], centre[3], m = 1, distance = 0, radius = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            m = fmax(m, fabs(x[i][k])), edge[i][k] = x[(i + 1) % 3][k] - x[i][k];
+    ebpo_vec3_cross(edge[0], edge[1], normal);
+    for (int k = 0; k < 3; k++) {
+        centre[k] = octant >> k & 1 ? 0.75 : 0.25;
+        distance += normal[k] * (x[0][k] - centre[k]);
+        radius += fabs(normal[k]);
+    }
+    if (fabs(distance) > 0.25 * radius + 0x1p-44 * m * m * m)
+        return true;
+    for (int i = 0; i < 9; i++) {
+        int a = (i / 3 + 1) % 3, b = (i / 3 + 2) % 3;
+        const double *p = x[i % 3], *q = x[(i + 2) % 3], *e = edge[i % 3];
+        double dp = e[a] * (p[b] - centre[b]) - e[b] * (p[a] - centre[a]),
+               dq = e[a] * (q[b] - centre[b]) - e[b] * (q[a] - centre[a]),
+               r = 0.25 * (fabs(e[a]) + fabs(e[b])) + 0x1p-46 * m * m;
+        if ((dp > r && dq > r) || (dp < -r && dq < -r))
+            return true;
+    }
+    return false;
+}
+
+START_TEST(test_octants_match_plain_loop)
+{
+    uint64_t seed = 4;
+    int found[8] = { 0 };
+    const ebpo_sweep *sweep = sweeps(_i);
+    for (int i = 0; i < 40000 && sweep; i++) {
+        ebpo_box box = box_of(i % 4, 12);
+        ebpo_cell cell = { i / 8 % 3, { 0, 0, 0 } };
+        ebpo_triangle t = random_face(&box, &seed, i / 4 % 2);
+        const ebpo_sweep_cell prepared = ebpo_octants_prepare(&box, cell);
+        double x[3][3];
+        unsigned mask = sweep->find_octants(&prepared, (const double(*)[3])t.corner);
+        for (int c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                x[c][k] = (t.corner[c][k] - box.origin[k]) / (box.size[k] / (1 << cell.level));
+        unsigned boxes = 255;
+        for (unsigned o = 0; o < 8; o++)
+            for (int k = 0; k < 3; k++) {
+                double centre = ebpo_cell_face(&box, k, cell.level + 1, 1), a = t.corner[0][k],
+                       b = t.corner[1][k], c = t.corner[2][k];
+                if (o >> k & 1 ? ebpo_max3(a, b, c) < centre : ebpo_min3(a, b, c) > centre)
+                    boxes &= ~(1u << o);
+            }
+        /* a single octant is not tested further */
+        for (unsigned o = 0; o < 8; o++) {
+            bool expected = boxes >> o & 1 &&
+                            ((boxes & (boxes - 1)) == 0 || !is_separated((const double(*)[3])x, o));
+            ck_assert_int_eq(mask >> o & 1, expected);
+            found[o] += expected;
+        }
+    }
+    for (int o = 0; o < 8 && sweep; o++)
+        ck_assert(found[o] > 4000 && found[o] < 36000);
+}
+END_TEST
+
+/* Points on a coarse grid, so that several are extreme along a direction. */
+START_TEST(test_extremes_and_planes_match_plain_loops)
+{
+    enum { POINTS = 50, EDGES = 7 };
+    uint64_t seed = 5;
+    const ebpo_sweep *sweep = sweeps(_i);
+    for (int round = 0; round < 2000 && sweep; round++) {
+        double p[POINTS][3], n[3], u[3], v[3];
+        int at[EBPO_SWEEP_EXTREMES], count = 1 + round % POINTS;
+        for (int i = 0; i < POINTS; i++)
+            for (int k = 0; k < 3; k++)
+                p[i][k] = round % 2 ? (double)(ebpo_test_random(&seed) % 4) / 4
+                                    : ebpo_test_random_unit(&seed);
+        sweep->find_extremes((const double(*)[3])p, count, at);
+        for (int w = 0; w < EBPO_SWEEP_EXTREMES; w++) {
+            double best = -INFINITY;
+            int first = 0;
+            for (int i = 0; i < count; i++) {
+                double x = p[i][0], y = p[i][1], z = p[i][2],
+                       along[7] = { x, y, z, x + y + z, x + y - z, x - y + z, x - y - z },
+                       value = w % 2 ? -along[w / 2] : along[w / 2];
+                if (value > best)
+                    best = value, first = i;
+            }
+            ck_assert_int_eq(at[w], first);
+        }
+        uint32_t edge[EDGES];
+        ebpo_sweep_plane plane[EDGES], expected;
+        for (uint32_t i = 0; i < EDGES; i++)
+            edge[i] = (2 * i) << 16 | (2 * i + 1);
+        sweep->make_planes((const double(*)[3])p, edge, 1 + round % EDGES, POINTS - 1, plane);
+        for (int i = 0; i < 1 + round % EDGES; i++) {
+            ebpo_vec3_subtract(p[2 * i + 1], p[2 * i], u);
+            ebpo_vec3_subtract(p[POINTS - 1], p[2 * i], v);
+            ebpo_vec3_cross(u, v, n);
+            expected.length = ebpo_vec3_length(n);
+            for (int k = 0; k < 3; k++)
+                expected.n[k] = n[k] / expected.length;
+            expected.d = ebpo_vec3_dot(expected.n, p[2 * i]);
+            ck_assert(plane[i].length == expected.length);
+            ck_assert(!(expected.length > 0) || memcmp(&plane[i], &expected, sizeof expected) == 0);
+        }
+    }
+}
+END_TEST
+
+/* A half of a polytope has the bits of a clip of the scaled polytope. */
+START_TEST(test_halves_match_clips)
+{
+    uint64_t seed = 6;
+    for (int round = 0; round < 2000; round++) {
+        ebpo_polytope p, half, clipped;
+        ebpo_polytope_cube(&p);
+        for (int i = 0; i < round % 12; i++) {
+            double n[3] = { ebpo_test_random_unit(&seed) - 0.5, ebpo_test_random_unit(&seed) - 0.5,
+                            ebpo_test_random_unit(&seed) - 0.5 },
+                   length = ebpo_vec3_length(n);
+            for (int k = 0; k < 3; k++)
+                n[k] /= length;
+            (void)ebpo_polytope_clip(
+                &p, n, 0.5 * (n[0] + n[1] + n[2]) + 0.6 * ebpo_test_random_unit(&seed) - 0.1, i);
+        }
+        int axis = round % 3, side = round / 3 % 2;
+        double n[3] = { 0, 0, 0 };
+        n[axis] = side ? -1 : 1;
+        ebpo_polytope_copy(&clipped, &p);
+        for (int i = 0; i < p.vertex_count; i++)
+            clipped.vertex[i][axis] = 2 * p.vertex[i][axis] - side;
+        ebpo_clip clip = ebpo_polytope_clip(&clipped, n, side ? 0 : 1, -1 - (2 * axis + !side));
+        if (clip == EBPO_CLIP_REFUSED)
+            ebpo_polytope_cube(&clipped);
+        ck_assert_int_eq(ebpo_polytope_half(&p, axis, side, &half), clip != EBPO_CLIP_REFUSED);
+        ck_assert_int_eq(half.vertex_count, clipped.vertex_count);
+        ck_assert_int_eq(half.face_count, clipped.face_count);
+        ck_assert_int_eq(half.corner_count, clipped.corner_count);
+        ck_assert(memcmp(half.vertex, clipped.vertex,
+                         (size_t)half.vertex_count * sizeof half.vertex[0]) == 0);
+        ck_assert(memcmp(half.corner, clipped.corner,
+                         (size_t)half.corner_count * sizeof half.corner[0]) == 0);
+        ck_assert(memcmp(half.tag, clipped.tag, (size_t)half.face_count * sizeof half.tag[0]) == 0);
+    }
+}
+END_TEST
+
 TEST_SUITE(planes)
 {
     Suite *suite = suite_create("planes");
@@ -253,6 +414,9 @@ TEST_SUITE(planes)
     tcase_add_test(tests, test_clipped_face_bounds_points_in_cell);
     tcase_add_test(tests, test_corner_windings_of_cube_in_cell);
     tcase_add_test(tests, test_lazy_greedy_matches_plain_greedy);
+    tcase_add_loop_test(tests, test_octants_match_plain_loop, 0, 2);
+    tcase_add_loop_test(tests, test_extremes_and_planes_match_plain_loops, 0, 2);
+    tcase_add_test(tests, test_halves_match_clips);
     suite_add_tcase(suite, tests);
     return suite;
 }
