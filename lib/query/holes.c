@@ -13,8 +13,9 @@
  * for w_S and for k give the same result in this cell and in all cells below it. In a white node (a
  * cell without faces), |w_D| may be greater. The whole cell still has one result if the bounds of k
  * + w_D are on one side of the rule's boundary. Near a cap, the value of w_S at the cell's centre
- * and a bound of its variation in the cell decide. Points of the remaining cells are decided one by
- * one (cap_winding.c).
+ * and a bound of its variation in the cell decide. Other cells are split. A part of a leaf that no
+ * face touches is treated as a white node. Points of the remaining cells are decided one by one
+ * (cap_winding.c).
  *
  * If a disc is far from a cell, the angle at which the disc appears is bounded once for the cell
  * and all cells below it. The other discs are near. Each cell has a list of its near discs, which

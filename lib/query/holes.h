@@ -39,12 +39,12 @@ static inline uint64_t ebpo_holes_marks_max(const ebpo_info *info)
 
 /* Finds the nodes of a table in which all points have the same result, and marks all nodes of the
  * table. A uniform entry (white node) gets a marked entry (ebpo_marked_entry) in place of the
- * winding number at the node's lowest corner. A leaf in which points must be decided one by one
- * gets the cell_face EBPO_NEAR_BORDER; in other leaves the rule for the integer winding number
- * decides, as in a solid. A uniform node whose points may have different results is split into
- * eight cells again and again, down to level `deepest`, and these cells are marked. The data that
- * are added to the table take at most `bytes`. Returns EBPO_E_LIMIT for winding numbers beyond
- * 2^25. */
+ * winding number at the node's lowest corner. A leaf in which the rule for the integer winding
+ * number does not decide everywhere gets the cell_face EBPO_NEAR_BORDER; in other leaves it
+ * decides, as in a solid. A uniform node whose points may have different results, or such a leaf,
+ * is split into eight cells again and again, down to level `deepest`, and these cells are marked.
+ * The data that are added to the table take at most `bytes`. Returns EBPO_E_LIMIT for winding
+ * numbers beyond 2^25. */
 typedef struct ebpo_marked_table {
     const ebpo_box *box; /* root cell of the model */
     ebpo_cell root;      /* cell of the table's root */
@@ -70,8 +70,8 @@ typedef enum ebpo_uniform_mark {
     EBPO_MARK_LISTED = 3, /* points are decided one by one; value: index of the ebpo_near_cell */
     EBPO_MARK_SPLIT = 4,  /* the cell has eight parts; value: index in ebpo_node_table.split */
     /* a leaf or a part of a leaf */
-    EBPO_MARK_FACES = 5,       /* no cap touches the cell; the rule for the winding number decides */
-    EBPO_MARK_FACES_NEAR = 6,  /* points are decided one by one */
+    EBPO_MARK_FACES = 5,      /* no cap touches the cell; the rule for the winding number decides */
+    EBPO_MARK_FACES_NEAR = 6, /* points are decided one by one */
     EBPO_MARK_FACES_LISTED = 7 /* the same; value: index of the ebpo_near_cell */
 } ebpo_uniform_mark;
 

@@ -16,7 +16,8 @@
  * surface may be outside its envelopes.
  *
  * In a surface with its border (the edges of its holes), leaves and white nodes near the border are
- * marked, and points in them are decided by holes.c.
+ * marked, and points in them are decided by holes.c. A batch gathers these points, and decides them
+ * together.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"
