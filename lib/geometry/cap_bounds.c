@@ -32,11 +32,13 @@
  *
  * Rounding. Each quantity is computed with a relative error below 2^-45, except V; `slack` bounds
  * the error of V, so it changes I by at most 5 `slack` / d^2, and (f' V) . (p - q) by at most 2 s
- * `slack` / d^3. Each slope adds 2^-40 a s / d^3, which covers the rounding of sums of up to 2^11
- * slopes. Rounding to float changes I by at most 2^-20 a R / d^3. Radii, areas and errors are
- * enlarged by a factor of 1 + 2^-40. Distances are used only between 2^-300 and 2^300. Lengths
- * below 2^-500 and areas below 2^-900 may underflow. They change the results by less than the
- * constants TINY and 2^-500, which are added.
+ * `slack` / d^3. Each addition of a slope to a field adds the rounding of the addition
+ * (add_sloped). A front adds at most 257 slopes; their norms are at most a / d^3, so the 2^-40 a s
+ * / d^3 that each slope adds to its error covers the rounding of these sums. Rounding to float
+ * changes I by at most 2^-20 a R / d^3. Radii, areas and errors are enlarged by a factor of 1 +
+ * 2^-40. Distances are used only between 2^-300 and 2^300. Lengths below 2^-500 and areas below
+ * 2^-900 may underflow. They change the results by less than the constants TINY and 2^-500, which
+ * are added.
  */
 #include "core/strict_fp.h"
 
@@ -266,6 +268,17 @@ static inline void add_slope(double sum[3], const double term[3])
         sum[k] += term[k];
 }
 
+/* Adds a term with a slope in the box to a sum. The error of the sum then includes the rounding of
+ * these additions at all points of the box. */
+static void add_sloped(ebpo_bounded *sum, double sum_slope[3], const ebpo_cap_box *box,
+                       ebpo_bounded term, const double slope[3])
+{
+    add_slope(sum_slope, slope);
+    for (int k = 0; k < 3; k++)
+        term.error += 0x1p-52 * fabs(sum_slope[k]) * box->half[k];
+    add_bounded(sum, term);
+}
+
 /* Expresses the same bounds with another centre. */
 static void move_field(ebpo_cap_field *f, const double centre[3])
 {
@@ -290,8 +303,7 @@ bool ebpo_cap_field_add(ebpo_cap_field *sum, const ebpo_cap_tree *tree, const eb
     ebpo_bounded b = bound_node(tree, node_of(tree, entry, &own), box, slope);
     if (!(b.error <= error))
         return false;
-    add_bounded(&sum->at_centre, b);
-    add_slope(sum->slope, slope);
+    add_sloped(&sum->at_centre, sum->slope, box, b, slope);
     return true;
 }
 
@@ -317,8 +329,7 @@ ebpo_status ebpo_cap_lists_narrow(ebpo_cap_lists *lists, const ebpo_cap_tree *tr
             if (n->radius + box->radius <= FAR * at.gap)
                 b = bound_placed(tree, n, box, &at, slope);
             if (b.error < n->most) {
-                add_bounded(&far->at_centre, b);
-                add_slope(far->slope, slope);
+                add_sloped(&far->at_centre, far->slope, box, b, slope);
             } else if (n->radius > box->radius && has_parts(tree, entry)) {
                 count += find_parts(tree, entry, stack + count);
             } else {
@@ -370,9 +381,11 @@ void ebpo_cap_front_begin(ebpo_cap_front *front, const ebpo_cap_tree *tree, cons
         } else if (!front->touched) {
             add_entry(front, entry[i]);
         } else {
-            add_bounded(&front->done, bound_entry(front, entry[i], slope));
+            ebpo_bounded b = bound_entry(front, entry[i], slope);
             if (box->radius > 0)
-                add_slope(front->done_slope, slope);
+                add_sloped(&front->done, front->done_slope, box, b, slope);
+            else
+                add_bounded(&front->done, b);
         }
     }
 }

@@ -64,9 +64,8 @@ typedef struct ebpo_near_field {
  * the first `nearest` entries alone. */
 typedef struct ebpo_near_cell {
     ebpo_near_field far, most;
-    /* If no face touches the cell: the winding number k of the mesh with its caps, at the lowest
-     * corner. If the cell is a leaf or a part of a leaf: the index of the ebpo_near_cell of the
-     * whole leaf, whose list has all caps that may touch the leaf; -1: no cap touches the leaf. */
+    /* The winding number k of the mesh with its caps, at the lowest corner. If the cell has several
+     * leaves, the leaves have their own winding numbers, and this one is 0. */
     int32_t winding;
     uint32_t first;
     uint16_t count, nearest;

@@ -43,9 +43,9 @@ typedef enum ebpo_leaf_kind {
  */
 enum { EBPO_LEAF_CELL_FACE_QUERIES = 1, EBPO_LEAF_KIND_QUERIES = 128 };
 /* Values of `cell_face` for a leaf without a free cell face. EBPO_NEAR_BORDER: the leaf of a
- * surface is near the border (the edges of holes). Then each query computes the generalized winding
- * number of its point (holes.h), and `rows` holds the leaf's mark (ebpo_marked_entry in holes.h) in
- * place of a row number. */
+ * surface is near the border (the edges of holes). Then the rule for the integer winding number
+ * does not decide in the whole leaf, and `rows` holds the leaf's mark (ebpo_marked_entry in
+ * holes.h) in place of a row number. */
 enum { EBPO_NO_CELL_FACE = 6, EBPO_NEAR_BORDER = 7 };
 /* A leaf with more planes is of the general kind. */
 enum { EBPO_KIND_PLANES_MAX = 16 };

@@ -13,8 +13,9 @@
  * for w_S and for k give the same result in this cell and in all cells below it. In a white node (a
  * cell without faces), |w_D| may be greater. The whole cell still has one result if the bounds of k
  * + w_D are on one side of the rule's boundary. Near a cap, the value of w_S at the cell's centre
- * and a bound of its variation in the cell decide. Points of the remaining cells are decided one by
- * one (cap_winding.c).
+ * and a bound of its variation in the cell decide. Other cells are split. A part of a leaf that no
+ * face touches is treated as a white node. Points of the remaining cells are decided one by one
+ * (cap_winding.c).
  *
  * If a disc is far from a cell, the angle at which the disc appears is bounded once for the cell
  * and all cells below it. The other discs are near. Each cell has a list of its near discs, which
@@ -31,6 +32,8 @@
 #include "format/border_loops.h"
 #include "geometry/cap_cells.h"
 #include "geometry/level_nodes.h"
+#include "geometry/predicates.h"
+#include "geometry/vec3.h"
 #include "query/holes.h"
 
 ebpo_status ebpo_holes_read(ebpo_holes **out, const ebpo_file *file, double threshold,
@@ -73,12 +76,26 @@ uint64_t ebpo_holes_bytes(const ebpo_holes *holes)
 
 /* --- marks --- */
 
+/* A face of the leaf that is being marked, with its bounding box. */
+typedef struct marked_face {
+    double corner[3][3], low[3], high[3];
+} marked_face;
+
+/* A leaf with more faces is not split. */
+enum { SPLIT_FACES_MAX = 1024 };
+
 typedef struct marking {
     const ebpo_holes *holes;
     const ebpo_marked_table *m;
     ebpo_cap_lists lists; /* of the near discs of all cells on the path to the current cell */
-    bool fits;            /* all winding numbers so far are small enough */
-    bool has_memory;      /* false: the lists are incomplete, because memory was not available */
+    marked_face *face;    /* faces of the current leaf */
+    uint64_t face_capacity;
+    /* indices of the faces that touch a part of the leaf, for all parts on the path to the current
+     * part; `touching_count` is the end of the last list */
+    uint16_t *touching;
+    uint64_t touching_count, touching_capacity;
+    bool fits;       /* all winding numbers so far are small enough */
+    bool has_memory; /* false: the lists are incomplete, because memory was not available */
     uint64_t split_capacity, near_capacity, disc_capacity;
     uint64_t bytes;       /* how many more bytes may be added to the table */
     uint64_t terms;       /* number of terms of all sums of bounds so far */
@@ -309,21 +326,113 @@ static int32_t store_near(marking *w, ebpo_cell cell, const near_discs *near, in
     return (int32_t)t->near_count++;
 }
 
-/* A cell, or a leaf or a part of a leaf, that is marked. */
+/* A cell without faces, or a leaf or a part of a leaf, that is marked. */
 typedef struct marked_cell {
     ebpo_cell cell;
-    /* of a cell without faces: k at the lowest corner; of a leaf: index of an ebpo_near_cell with
-     * the caps that may touch the leaf, or -1 (see mark_leaf) */
-    int32_t winding;
-    bool leaf;
-    int32_t record; /* index of an ebpo_near_cell that contains the cell, or -1 */
+    int32_t winding; /* k at the lowest corner */
+    bool faces;      /* faces may touch the cell */
+    /* the list of these faces, unless the cell cannot be split:
+     * marking.touching[first_face .. end_face - 1] */
+    uint64_t first_face, end_face;
+    int32_t record; /* index of an ebpo_near_cell for the cell (EBPO_MARK_FACES_LISTED), or -1 */
 } marked_cell;
+
+/* Adds a face of the current leaf to the list, if its bounding box touches the leaf's cell. Returns
+ * false when out of memory, or if the leaf has too many faces. */
+static bool add_face(marking *w, const double t[3][3], const double low[3], const double high[3])
+{
+    marked_face made;
+    uint64_t count = w->touching_count;
+    for (int k = 0; k < 3; k++) {
+        made.low[k] = ebpo_min3(t[0][k], t[1][k], t[2][k]);
+        made.high[k] = ebpo_max3(t[0][k], t[1][k], t[2][k]);
+        if (made.low[k] > high[k] || made.high[k] < low[k])
+            return true;
+    }
+    memcpy(made.corner, t, sizeof made.corner);
+    if (count == SPLIT_FACES_MAX ||
+        !ebpo_grow(&w->face, &w->face_capacity, count + 1, sizeof *w->face))
+        return false;
+    w->face[count] = made;
+    w->touching_count++;
+    return true;
+}
+
+/* Lists the faces that may touch the cell of a leaf. Returns false when out of memory, or if the
+ * leaf has too many faces. */
+static bool list_faces(marking *w, const ebpo_accel_leaf *leaf, marked_cell *cell)
+{
+    const ebpo_accel *s = w->m->accel;
+    double low[3], high[3];
+    w->touching_count = 0;
+    ebpo_cell_bounds(w->m->box, cell->cell, low, high);
+    for (const ebpo_listed_block *at = s->list + leaf->list;; at++) {
+        uint64_t listed = ebpo_listed(at);
+        for (unsigned lanes = ebpo_listed_lanes(listed); lanes; lanes &= lanes - 1) {
+            double t[3][3];
+            ebpo_accel_triangle(
+                s, ebpo_listed_number(listed) * EBPO_BLOCK + (unsigned)__builtin_ctz(lanes), t);
+            if (!add_face(w, (const double(*)[3])t, low, high))
+                return false;
+        }
+        if (listed & EBPO_LISTED_LAST)
+            break;
+    }
+    /* a list for the leaf and for one cell of each level below it */
+    uint64_t count = w->touching_count;
+    if (!ebpo_grow(&w->touching, &w->touching_capacity, count * (EBPO_LEVELS_MAX + 1),
+                   sizeof *w->touching))
+        return false;
+    for (uint64_t i = 0; i < count; i++)
+        w->touching[i] = (uint16_t)i;
+    cell->first_face = 0;
+    cell->end_face = count;
+    cell->faces = count > 0;
+    return true;
+}
+
+/* Lists the faces that may touch a part of a cell. */
+static void list_faces_of_part(marking *w, const marked_cell *whole, marked_cell *part,
+                               const double low[3], const double high[3])
+{
+    part->first_face = w->touching_count;
+    for (uint64_t i = whole->first_face; i < whole->end_face; i++) {
+        const marked_face *f = &w->face[w->touching[i]];
+        if (f->low[0] <= high[0] && f->high[0] >= low[0] && f->low[1] <= high[1] &&
+            f->high[1] >= low[1] && f->low[2] <= high[2] && f->high[2] >= low[2])
+            w->touching[w->touching_count++] = w->touching[i];
+    }
+    part->end_face = w->touching_count;
+    part->faces = part->end_face > part->first_face;
+}
+
+/* Returns the sum of the crossings with the faces of a cell on the way from the cell's lowest
+ * corner (`low`) to a point p of the cell. */
+static int32_t cross_faces(const marking *w, const marked_cell *whole, const double low[3],
+                           const double p[3])
+{
+    double from[3] = { low[0], low[1], low[2] };
+    int32_t sum = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        int u = axis == 2 ? 0 : axis + 1, v = axis == 0 ? 2 : axis - 1;
+        for (uint64_t i = whole->first_face; i < whole->end_face && p[axis] > from[axis]; i++) {
+            const marked_face *f = &w->face[w->touching[i]];
+            if (f->low[u] <= from[u] && f->high[u] >= from[u] && f->low[v] <= from[v] &&
+                f->high[v] >= from[v])
+                sum += ebpo_axis_crossing(from, p[axis], axis, f->corner[0], f->corner[1],
+                                          f->corner[2]);
+        }
+        from[axis] = p[axis];
+    }
+    return sum;
+}
 
 static int32_t mark_cell(marking *w, const marked_cell *marked, const near_discs *parent);
 
 /* Splits a cell into eight parts and marks the parts. If the parts cannot be split, they share one
- * ebpo_near_cell, that of the whole cell. Returns the index of the parts in the table's `split`, or
- * -1 if the cell cannot be split. */
+ * ebpo_near_cell, that of the whole cell; parts without faces do not share that of a cell with
+ * faces. Returns the index of the parts in the table's `split`, or -1 if the cell cannot be split.
+ */
 static int32_t split_cell(marking *w, const marked_cell *whole, const near_discs *near)
 {
     ebpo_node_table *t = w->m->table;
@@ -331,18 +440,24 @@ static int32_t split_cell(marking *w, const marked_cell *whole, const near_discs
     marked_cell part = *whole;
     double low[3], corner[3], high[3];
     if (whole->cell.level >= w->m->deepest || index >= 1 << 25 ||
+        (whole->faces && whole->first_face == whole->end_face) ||
         !grow_in_quota(w, &t->split, &w->split_capacity, index + 1, sizeof *t->split))
         return -1;
     t->split_count++;
     if (whole->cell.level + 1 == w->m->deepest && whole->record < 0)
         part.record = store_near(w, whole->cell, near, whole->winding);
+    const int32_t record = part.record;
     ebpo_cell_bounds(w->m->box, whole->cell, low, high);
     for (unsigned octant = 0; octant < 8; octant++) {
         part.cell = ebpo_cell_child(whole->cell, octant);
         ebpo_cell_bounds(w->m->box, part.cell, corner, high);
-        part.winding = whole->winding + (whole->leaf ? 0 : cross_near(w, near, low, corner));
+        part.winding =
+            whole->winding + cross_near(w, near, low, corner) + cross_faces(w, whole, low, corner);
+        list_faces_of_part(w, whole, &part, corner, high);
+        part.record = part.faces == whole->faces ? record : -1;
         int32_t marked = mark_cell(w, &part, near);
         t->split[index][octant] = marked;
+        w->touching_count = part.first_face;
     }
     return (int32_t)index;
 }
@@ -355,8 +470,9 @@ static int32_t mark_undecided(marking *w, const marked_cell *m, const near_discs
     if (index >= 0)
         return ebpo_marked_entry(index, EBPO_MARK_SPLIT);
     index = m->record >= 0 ? m->record : store_near(w, m->cell, near, m->winding);
-    return index >= 0 ? ebpo_marked_entry(index, EBPO_MARK_LISTED)
-                      : ebpo_marked_entry(m->winding, EBPO_MARK_NEAR);
+    ebpo_uniform_mark listed = m->faces ? EBPO_MARK_FACES_LISTED : EBPO_MARK_LISTED,
+                      unlisted = m->faces ? EBPO_MARK_FACES_NEAR : EBPO_MARK_NEAR;
+    return index >= 0 ? ebpo_marked_entry(index, listed) : ebpo_marked_entry(m->winding, unlisted);
 }
 
 /* Returns the marked entry of a cell without faces, or of a leaf or part of a leaf. */
@@ -364,48 +480,43 @@ static int32_t mark_cell(marking *w, const marked_cell *m, const near_discs *par
 {
     const ebpo_cap_box box = box_of(w, m->cell);
     const near_discs near = narrow_list(w, &box, parent);
-    int32_t result = -1, marked;
+    int32_t marked = 0;
+    bool decided = false;
     w->fits = w->fits && abs(m->winding) < 1 << 25;
     if (!w->fits) /* the marks fail, and sums of winding numbers could overflow */
         return 0;
-    if (near.decided)
-        result = !m->leaf && ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, m->winding);
-    else if (w->has_memory)
-        result = !m->leaf ? find_result(w, m->cell, &box, &near, m->winding)
-                 : is_far_leaf(w, m->cell, &box, &near) ? 0
-                                                        : -1;
-    marked = result >= 0 ? ebpo_marked_entry(m->winding, (ebpo_uniform_mark)result)
-                         : mark_undecided(w, m, &near);
+    if (m->faces) {
+        decided = near.decided || (w->has_memory && is_far_leaf(w, m->cell, &box, &near));
+        marked = ebpo_marked_entry(m->winding, EBPO_MARK_FACES);
+    } else {
+        int result = near.decided    ? ebpo_rule_inside((ebpo_rule)w->holes->rule.rule, m->winding)
+                     : w->has_memory ? find_result(w, m->cell, &box, &near, m->winding)
+                                     : -1;
+        decided = result >= 0;
+        marked = ebpo_marked_entry(m->winding, (ebpo_uniform_mark)(decided && result));
+    }
+    if (!decided)
+        marked = mark_undecided(w, m, &near);
     w->lists.count = near.begin;
     return marked;
 }
 
-/* Stores an ebpo_near_cell for leaves. Returns its index, or -1. */
-static int32_t store_leaf_record(marking *w, ebpo_cell cell, const near_discs *near)
-{
-    int32_t index = store_near(w, cell, near, 0);
-    if (index >= 0)
-        w->m->table->near[index].winding = index;
-    return index;
-}
-
-/* Marks a leaf, if the rule for k does not decide in it. If caps may touch the leaf, stores these
- * caps in an ebpo_near_cell, because queries must count the crossings with these caps. */
+/* Marks a leaf, if the rule for k does not decide in it. */
 static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const near_discs *parent)
 {
     const ebpo_accel *s = w->m->accel;
     const ebpo_cap_box box = box_of(w, cell);
     const near_discs near = narrow_list(w, &box, parent);
     if (!near.decided && (!w->has_memory || !is_far_leaf(w, cell, &box, &near))) {
-        bool touched = caps_touch(w, cell, &near);
-        int32_t caps = near.record >= 0 ? near.record
-                       : touched        ? store_leaf_record(w, cell, &near)
-                                        : -1;
-        marked_cell m = { cell, caps, true, cell.level + 1 >= w->m->deepest ? caps : -1 };
+        marked_cell m = {
+            .cell = cell, .winding = leaf->winding, .faces = true, .record = near.record
+        };
+        w->fits = w->fits && abs(leaf->winding) < 1 << 25;
+        if (cell.level < w->m->deepest && !list_faces(w, leaf, &m))
+            m.first_face = m.end_face;
         leaf->kind = EBPO_LEAF_GENERAL;
         leaf->cell_face = EBPO_NEAR_BORDER;
-        leaf->rows = (uint32_t)(touched && caps < 0 ? ebpo_marked_entry(0, EBPO_MARK_NEAR)
-                                                    : mark_undecided(w, &m, &near));
+        leaf->rows = (uint32_t)(w->fits ? mark_undecided(w, &m, &near) : 0);
         w->m->cell_faces(s, s->list + leaf->list, cell);
     }
     w->lists.count = near.begin;
@@ -413,7 +524,7 @@ static void mark_leaf(marking *w, ebpo_accel_leaf *leaf, ebpo_cell cell, const n
 
 static uint32_t mark_uniform(marking *w, ebpo_cell cell, int32_t winding, const near_discs *parent)
 {
-    const marked_cell m = { cell, winding, false, -1 };
+    const marked_cell m = { .cell = cell, .winding = winding, .record = -1 };
     uint32_t entry = 0;
     w->fits = ebpo_entry_uniform(mark_cell(w, &m, parent), &entry) && w->fits;
     return entry;
@@ -438,7 +549,7 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_di
         near_discs near = narrow_list(w, &box, parent);
         near.decided = near.decided || (w->has_memory && is_far(w, &box, &near, STEPS));
         if (w->m->accel && !near.decided && near.record < 0 && cell.level + 1 >= w->m->deepest)
-            near.record = store_leaf_record(w, cell, &near);
+            near.record = store_near(w, cell, &near, 0); /* its leaves have their own k */
         for (unsigned octant = 0; octant < 8; octant++)
             mark_node(w, &t->group[value][octant], ebpo_cell_child(cell, octant), &near);
         w->lists.count = near.begin;
@@ -448,19 +559,38 @@ static void mark_node(marking *w, uint32_t *entry, ebpo_cell cell, const near_di
     }
 }
 
-/* Replaces the entries of split uniform nodes in the grid by those of their parts. */
-static void paint_parts(ebpo_node_table *t)
+/* Returns true if an entry of the grid is of a node with a mark. *marked: the mark. */
+static bool has_mark(const ebpo_marked_table *m, uint32_t entry, int32_t *marked)
 {
+    if (ebpo_entry_kind_of(entry) == EBPO_ENTRY_UNIFORM) {
+        *marked = ebpo_entry_winding(entry);
+        return true;
+    }
+    if (ebpo_entry_kind_of(entry) != EBPO_ENTRY_LEAF || !m->accel)
+        return false;
+    const ebpo_accel_leaf *leaf = &m->accel->leaf[ebpo_entry_value(entry)];
+    *marked = (int32_t)leaf->rows;
+    return ebpo_leaf_kind_of(leaf) == EBPO_LEAF_GENERAL && leaf->cell_face == EBPO_NEAR_BORDER;
+}
+
+/* Replaces the entries of split nodes in the grid by those of their parts. Parts of leaves that
+ * have faces, or whose parts may have faces, keep the entry of the leaf. */
+static void paint_parts(const ebpo_marked_table *m)
+{
+    ebpo_node_table *t = m->table;
     uint32_t side = t->grid ? 1u << t->grid_bits : 0, at[3];
     uint64_t i = 0;
+    int32_t marked;
     for (at[2] = 0; at[2] < side; at[2]++)
         for (at[1] = 0; at[1] < side; at[1]++)
             for (at[0] = 0; at[0] < side; at[0]++, i++) {
                 int level = t->grid_depth[i];
-                if (ebpo_entry_kind_of(t->grid[i]) != EBPO_ENTRY_UNIFORM)
+                bool leaf = ebpo_entry_kind_of(t->grid[i]) == EBPO_ENTRY_LEAF;
+                if (!has_mark(m, t->grid[i], &marked))
                     continue;
-                int32_t marked = ebpo_marked_part(t, ebpo_entry_winding(t->grid[i]), at,
-                                                  t->grid_bits, t->grid_bits, &level);
+                marked = ebpo_marked_part(t, marked, at, t->grid_bits, t->grid_bits, &level);
+                if (leaf && ebpo_entry_mark(marked) >= EBPO_MARK_SPLIT)
+                    continue;
                 if (ebpo_entry_uniform(marked, &t->grid[i]))
                     t->grid_depth[i] = (uint8_t)level;
             }
@@ -488,6 +618,8 @@ ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, 
     shrink_array(&table->disc, table->disc_count, sizeof *table->disc);
     shrink_array(&table->split, table->split_count, sizeof *table->split);
     free(w->lists.entry);
+    free(w->face);
+    free(w->touching);
     free(w);
     if (table->grid) { /* the grid has copies of entries, so the grid is made again */
         free(table->grid);
@@ -496,7 +628,7 @@ ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_table *marked, 
         table->grid_depth = NULL;
         table->grid_bits = 0;
         ebpo_node_table_make_grid(table);
-        paint_parts(table);
+        paint_parts(marked);
     }
     return fits ? EBPO_OK
                 : ebpo_fail(error, EBPO_E_LIMIT, "the winding number of a node is beyond 2^25");

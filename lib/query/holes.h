@@ -34,17 +34,17 @@ static inline uint64_t ebpo_holes_estimate(const ebpo_info *info)
 /* Returns the maximum bytes that ebpo_holes_mark adds to the table of a whole model. */
 static inline uint64_t ebpo_holes_marks_max(const ebpo_info *info)
 {
-    return info->parts & EBPO_PART_BORDER ? (UINT64_C(1) << 19) + 320 * info->border_points : 0;
+    return info->parts & EBPO_PART_BORDER ? (UINT64_C(1) << 20) + 320 * info->border_points : 0;
 }
 
 /* Finds the nodes of a table in which all points have the same result, and marks all nodes of the
  * table. A uniform entry (white node) gets a marked entry (ebpo_marked_entry) in place of the
- * winding number at the node's lowest corner. A leaf in which points must be decided one by one
- * gets the cell_face EBPO_NEAR_BORDER; in other leaves the rule for the integer winding number
- * decides, as in a solid. A uniform node whose points may have different results is split into
- * eight cells again and again, down to level `deepest`, and these cells are marked. The data that
- * are added to the table take at most `bytes`. Returns EBPO_E_LIMIT for winding numbers beyond
- * 2^25. */
+ * winding number at the node's lowest corner. A leaf in which the rule for the integer winding
+ * number does not decide everywhere gets the cell_face EBPO_NEAR_BORDER; in other leaves it
+ * decides, as in a solid. A uniform node whose points may have different results, or such a leaf,
+ * is split into eight cells again and again, down to level `deepest`, and these cells are marked.
+ * The data that are added to the table take at most `bytes`. Returns EBPO_E_LIMIT for winding
+ * numbers beyond 2^25. */
 typedef struct ebpo_marked_table {
     const ebpo_box *box; /* root cell of the model */
     ebpo_cell root;      /* cell of the table's root */
@@ -59,13 +59,20 @@ EBPO_MUST_USE ebpo_status ebpo_holes_mark(ebpo_holes *holes, const ebpo_marked_t
 /* Returns the bytes that ebpo_holes_mark has added to a table. */
 uint64_t ebpo_holes_marked_bytes(const ebpo_node_table *table);
 
-/* The result for the points of a cell without faces. A marked entry has a mark and a value. */
+/* The result for the points of a cell: a white or black node, a leaf near the border, or a part of
+ * these. A marked entry has a mark and a value. For most marks, the value is the winding number at
+ * the cell's lowest corner (ebpo_holes_mark). */
 typedef enum ebpo_uniform_mark {
-    EBPO_MARK_OUT = 0,    /* all points are outside; value: winding number (ebpo_holes_mark) */
-    EBPO_MARK_IN = 1,     /* all points are inside; value: winding number */
-    EBPO_MARK_NEAR = 2,   /* points are decided one by one; value: winding number */
+    /* a cell without faces */
+    EBPO_MARK_OUT = 0,    /* all points are outside */
+    EBPO_MARK_IN = 1,     /* all points are inside */
+    EBPO_MARK_NEAR = 2,   /* points are decided one by one */
     EBPO_MARK_LISTED = 3, /* points are decided one by one; value: index of the ebpo_near_cell */
-    EBPO_MARK_SPLIT = 4   /* the cell has eight parts; value: index in ebpo_node_table.split */
+    EBPO_MARK_SPLIT = 4,  /* the cell has eight parts; value: index in ebpo_node_table.split */
+    /* a leaf or a part of a leaf */
+    EBPO_MARK_FACES = 5,      /* no cap touches the cell; the rule for the winding number decides */
+    EBPO_MARK_FACES_NEAR = 6, /* points are decided one by one */
+    EBPO_MARK_FACES_LISTED = 7 /* the same; value: index of the ebpo_near_cell */
 } ebpo_uniform_mark;
 
 /* ebpo_marked_entry makes a marked entry. ebpo_entry_mark and ebpo_marked_value return the mark and

@@ -16,7 +16,8 @@
  * surface may be outside its envelopes.
  *
  * In a surface with its border (the edges of its holes), leaves and white nodes near the border are
- * marked, and points in them are decided by holes.c.
+ * marked, and points in them are decided by holes.c. A batch gathers these points, and decides them
+ * together.
  *
  * Sources: EBP 2017, 4.2; format-spec, section 10. */
 #include "core/strict_fp.h"
@@ -73,6 +74,7 @@ static bool cross_leaf(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
 /* A point in a leaf's cell. */
 typedef struct leaf_point {
     ebpo_cell leaf; /* the leaf's cell */
+    int deepest;    /* level of `position` */
     double xi[3];   /* coordinates in the cell, 0 .. 1; the error is at most 2^-30 */
     const ebpo_position *position;
     uint32_t sixteenth; /* coordinates in sixteenths of the cell, eight bits for each axis, as the
@@ -95,6 +97,7 @@ static inline void find_leaf_point(int deepest, int level, const ebpo_position *
 {
     int up = deepest - level;
     out->leaf.level = level;
+    out->deepest = deepest;
     out->position = position;
     out->sixteenth = 0;
     find_coordinates(deepest, level, position, out->xi);
@@ -145,24 +148,53 @@ static bool from_cell_face(const ebpo_inside_kernels *kernels, const ebpo_accel 
     return true;
 }
 
-/* Computes the winding number by three segments from the lowest corner to the point (format-spec,
- * section 10). Returns false if the point is on a face; only the last segment, which ends at the
- * point, tests this. `boxed`: the boxes of the leaf's list are known. */
-static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
-                        const ebpo_accel_leaf *leaf, bool boxed, const leaf_point *at,
-                        const double p[3], uint32_t *open, int32_t *winding)
+/* The lowest corner of a leaf's cell, or of a part of this cell. */
+typedef struct path_start {
+    double low[3];
+    int32_t winding;
+    uint32_t reach; /* ebpo_axis_segment.reach for a segment of length 0 at the corner */
+} path_start;
+
+/* Returns the lowest corner of the leaf's cell, or of the part that has this level and contains the
+ * point. `winding`: winding number at the corner. */
+static path_start start_of(const ebpo_accel *s, int32_t winding, const leaf_point *at, int level)
 {
-    double low[3], high[3];
-    ebpo_cell_bounds(&s->box, at->leaf, low, high);
+    path_start out = { .winding = winding, .reach = 0xf0f0f0 };
+    ebpo_cell cell = at->leaf;
+    double high[3];
+    int down = level - cell.level;
+    if (down > 0) {
+        const uint32_t *position = at->position->at;
+        cell = ebpo_cell_ancestor((ebpo_cell){ at->deepest,
+                                               { position[0], position[1], position[2] } },
+                                  level);
+        out.reach = 0;
+        for (int k = 0; k < 3; k++) {
+            uint32_t x = (down < 4 ? cell.at[k] << (4 - down) : cell.at[k] >> (down - 4)) & 15;
+            out.reach |= (x | (15 - x) << 4) << 8 * k;
+        }
+    }
+    ebpo_cell_bounds(&s->box, cell, out.low, high);
+    return out;
+}
+
+/* Computes the winding number by three segments from a corner to the point (format-spec, section
+ * 10). Returns false if the point is on a face; only the last segment, which ends at the point,
+ * tests this. `boxed`: the boxes of the leaf's list are known. */
+static bool from_corner(const ebpo_inside_kernels *kernels, const ebpo_accel *s,
+                        const ebpo_accel_leaf *leaf, bool boxed, const path_start *start,
+                        const leaf_point *at, const double p[3], uint32_t *open, int32_t *winding)
+{
+    const double *low = start->low;
     ebpo_axis_segment g = { { low[0], low[1], low[2] }, 0, 0, EBPO_REACH_ALL };
-    uint32_t reach = 0xf0f0f0; /* the segment begins at the corner on all axes */
-    *winding = leaf->winding;
+    uint32_t reach = start->reach;
+    *winding = start->winding;
     for (int axis = 0; axis < 3; axis++) {
         int32_t sum;
         uint32_t byte = UINT32_C(0xff) << 8 * axis;
         g.axis = axis;
         g.to = p[axis];
-        reach |= at->sixteenth & byte;
+        reach = (reach & ~(UINT32_C(0x0f) << 8 * axis)) | (at->sixteenth & byte);
         if (boxed)
             g.reach = reach;
         if (!cross_leaf(kernels, s, leaf, &g, axis == 2 ? p : NULL, open, &sum))
@@ -278,104 +310,57 @@ static void decide_near(const ebpo_context *context, const ebpo_node_table *tabl
     *out = (ebpo_inside_result){ (int32_t)where, where == EBPO_IN, 0 };
 }
 
-/* Decides a point of a leaf near the border. `winding`: winding number of surface and caps at the
- * leaf's lowest corner, plus the crossings of faces on the way to the point. This function adds the
- * crossings of caps on this way. */
-static void decide_in_leaf(const ebpo_context *context, const ebpo_accel *s,
-                           const ebpo_accel_leaf *leaf, const leaf_point *at, const double p[3],
-                           int32_t winding, ebpo_inside_result *out)
+/* Ensures the capacity of context->open. */
+static ebpo_status prepare_open(ebpo_context *context, const ebpo_accel *s, ebpo_error *error)
 {
-    int level = at->leaf.level;
-    int32_t marked =
-        ebpo_marked_part(&s->nodes, (int32_t)leaf->rows, at->position->at,
-                         context->model->locator.level, context->model->locator.level, &level);
-    const ebpo_holes *holes = context->model->holes;
-    const ebpo_near_cell *cell = NULL;
-    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
-    int32_t caps = ebpo_marked_value(marked);
-    double low[3], high[3];
-    ebpo_cell_bounds(&s->box, at->leaf, low, high);
-    if (mark == EBPO_MARK_LISTED) {
-        cell = &s->nodes.near[caps];
-        caps = cell->winding;
-    }
-    if (mark == EBPO_MARK_NEAR)
-        winding += ebpo_holes_crossings(holes, low, p);
-    else if (caps >= 0)
-        winding += ebpo_holes_list_crossings(holes, &s->nodes, &s->nodes.near[caps], low, p);
-    if (mark == EBPO_MARK_OUT)
-        give_winding(context, winding, out);
-    else
-        decide_near(context, &s->nodes, cell, winding, at->position, p, out);
+    uint64_t most = (uint64_t)s->list_longest * EBPO_BLOCK;
+    if (most > context->open_capacity &&
+        !ebpo_grow(&context->open, &context->open_capacity, most, sizeof *context->open))
+        return ebpo_fail_memory(error, most * sizeof *context->open);
+    return EBPO_OK;
 }
 
-/* Decides a point in a leaf by counting crossings. */
+/* Decides a point in a leaf by counting crossings. The leaf is not near the border, or its kind is
+ * not known. */
 static ebpo_status result_by_faces(ebpo_context *context, const ebpo_accel *s,
                                    const ebpo_accel_leaf *leaf, bool bounded, const leaf_point *at,
                                    const double p[3], ebpo_inside_result *out, ebpo_error *error)
 {
     const ebpo_inside_kernels *kernels = context->model->kernels.inside;
-    uint64_t open_max = (uint64_t)s->list_longest * EBPO_BLOCK;
     int32_t winding;
+    bool on_no_face;
+    ebpo_status status = prepare_open(context, s, error);
+    if (status != EBPO_OK)
+        return status;
     /* another thread may be writing the cell face of a leaf that is not bounded yet */
-    bool near = bounded && leaf->cell_face == EBPO_NEAR_BORDER;
-    if (open_max > context->open_capacity &&
-        !ebpo_grow(&context->open, &context->open_capacity, open_max, sizeof *context->open))
-        return ebpo_fail_memory(error, open_max * sizeof *context->open);
-    bool on_no_face = bounded && leaf->cell_face < EBPO_NO_CELL_FACE
-                          ? from_cell_face(kernels, s, leaf, at, p, context->open, &winding)
-                          : from_corner(kernels, s, leaf, bounded, at, p, context->open, &winding);
-    if (!on_no_face)
-        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
-    else if (near)
-        decide_in_leaf(context, s, leaf, at, p, winding, out);
-    else
+    if (bounded && leaf->cell_face < EBPO_NO_CELL_FACE) {
+        on_no_face = from_cell_face(kernels, s, leaf, at, p, context->open, &winding);
+    } else {
+        const path_start start = start_of(s, leaf->winding, at, at->leaf.level);
+        on_no_face = from_corner(kernels, s, leaf, bounded, &start, at, p, context->open, &winding);
+    }
+    if (on_no_face)
         give_winding(context, winding, out);
+    else
+        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
     return EBPO_OK;
 }
 
-/* Decides a point in a leaf, by planes if the leaf's kind allows it. */
-static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
-                                  const leaf_point *at, const double p[3], ebpo_inside_result *out,
-                                  ebpo_error *error)
-{
-    int32_t winding;
-    ebpo_leaf_kind kind = kind_of(context, s, leaf, at);
-    if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, at, &winding))
-        return result_by_faces(context, s, leaf, ebpo_leaf_is_bounded(kind), at, p, out, error);
-    give_winding(context, winding, out);
-    return EBPO_OK;
-}
-
-/* Classifies p in leaf `index` of a subtree. The leaf is at this level, p is in the leaf's cell,
- * and `position` is p's shifted position. */
-static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t index,
-                               int level, const ebpo_position *position, const double p[3],
-                               ebpo_inside_result *out, ebpo_error *error)
-{
-    leaf_point at;
-    find_leaf_point(context->model->locator.level, level, position, &at);
-    return result_in_leaf(context, s, &s->leaf[index], &at, p, out, error);
-}
-
-/* In a surface, classifies a point in a white node with the mark EBPO_MARK_IN or EBPO_MARK_OUT. */
+/* In a surface, classifies a point in a cell with the mark EBPO_MARK_IN or EBPO_MARK_OUT. */
 static inline void give_marked(int32_t marked, ebpo_inside_result *out)
 {
     bool in = ebpo_entry_mark(marked) == EBPO_MARK_IN;
     *out = (ebpo_inside_result){ in ? EBPO_IN : EBPO_OUT, in, 0 };
 }
 
-/* In a surface, classifies a point in a white node with any mark (ebpo_uniform_mark). If
- * ebpo_context.undecided is true, computes the winding number at the point. It may differ from the
- * winding number at the cell's lowest corner, because caps may cross the cell. */
-static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
-                                                    const ebpo_node_table *table, uint32_t entry,
-                                                    const ebpo_position *position, int level,
-                                                    const double p[3], ebpo_inside_result *out)
+/* In a surface, classifies a point in a cell of this level without faces. If ebpo_context.undecided
+ * is true, computes the winding number at the point. It may differ from the winding number at the
+ * cell's lowest corner, because caps may cross the cell. */
+static void decide_without_faces(const ebpo_context *context, const ebpo_node_table *table,
+                                 int32_t marked, int level, const ebpo_position *position,
+                                 const double p[3], ebpo_inside_result *out)
 {
     int deepest = context->model->locator.level;
-    int32_t marked =
-        ebpo_marked_part(table, ebpo_entry_winding(entry), position->at, deepest, deepest, &level);
     ebpo_uniform_mark mark = ebpo_entry_mark(marked);
     const ebpo_box box = ebpo_model_box(context->model);
     const ebpo_holes *holes = context->model->holes;
@@ -401,17 +386,132 @@ static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
     decide_near(context, table, near, winding, position, p, out);
 }
 
-/* Classifies a point in a white or black node of a table. */
-static inline void inside_uniform(const ebpo_context *context, const ebpo_node_table *table,
-                                  uint32_t entry, const ebpo_position *position, int level,
-                                  const double p[3], ebpo_inside_result *out)
+/* Decides a point in a leaf near the border, or in a part of it with faces. `level`: level of the
+ * part. */
+static ebpo_status decide_with_faces(ebpo_context *context, const ebpo_accel *s,
+                                     const ebpo_accel_leaf *leaf, int32_t marked, int level,
+                                     const leaf_point *at, const double p[3],
+                                     ebpo_inside_result *out, ebpo_error *error)
+{
+    const ebpo_holes *holes = context->model->holes;
+    const ebpo_near_cell *near = NULL;
+    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
+    int32_t winding = ebpo_marked_value(marked);
+    ebpo_status status = prepare_open(context, s, error);
+    if (status != EBPO_OK)
+        return status;
+    if (mark == EBPO_MARK_FACES_LISTED) {
+        near = &s->nodes.near[winding];
+        bool of_leaf = near->level >= at->leaf.level; /* false: of several leaves */
+        winding = of_leaf ? near->winding : leaf->winding;
+        level = of_leaf ? near->level : at->leaf.level;
+    }
+    const path_start start = start_of(s, winding, at, level);
+    if (!from_corner(context->model->kernels.inside, s, leaf, true, &start, at, p, context->open,
+                     &winding)) {
+        *out = (ebpo_inside_result){ EBPO_ON, 0, 0 };
+        return EBPO_OK;
+    }
+    if (mark == EBPO_MARK_FACES) {
+        give_winding(context, winding, out);
+        return EBPO_OK;
+    }
+    winding += near ? ebpo_holes_list_crossings(holes, &s->nodes, near, start.low, p)
+                    : ebpo_holes_crossings(holes, start.low, p);
+    decide_near(context, &s->nodes, near, winding, at->position, p, out);
+    return EBPO_OK;
+}
+
+/* Returns true if the leaf is near the border of a surface. */
+static inline bool is_near_border(ebpo_leaf_kind kind, const ebpo_accel_leaf *leaf)
+{
+    return kind == EBPO_LEAF_GENERAL && leaf->cell_face == EBPO_NEAR_BORDER;
+}
+
+/* Decides a point in a part of a leaf or white node near the border. `level`: level of the part.
+ * `leaf`: NULL for a white node; then only `at->position` is read. */
+static ebpo_status result_in_part(ebpo_context *context, const ebpo_accel *s,
+                                  const ebpo_accel_leaf *leaf, int32_t marked, int level,
+                                  const leaf_point *at, const double p[3], ebpo_inside_result *out,
+                                  ebpo_error *error)
+{
+    if (ebpo_entry_mark(marked) >= EBPO_MARK_FACES)
+        return decide_with_faces(context, s, leaf, marked, level, at, p, out, error);
+    decide_without_faces(context, &s->nodes, marked, level, at->position, p, out);
+    return EBPO_OK;
+}
+
+/* Decides a point in a leaf near the border. */
+static ebpo_status result_near_border(ebpo_context *context, const ebpo_accel *s,
+                                      const ebpo_accel_leaf *leaf, const leaf_point *at,
+                                      const double p[3], ebpo_inside_result *out, ebpo_error *error)
+{
+    int level = at->leaf.level, deepest = context->model->locator.level;
+    int32_t marked = ebpo_marked_part(&s->nodes, (int32_t)leaf->rows, at->position->at, deepest,
+                                      deepest, &level);
+    return result_in_part(context, s, leaf, marked, level, at, p, out, error);
+}
+
+/* Decides a point in a leaf, by planes if the leaf's kind allows it. */
+static ebpo_status result_in_leaf(ebpo_context *context, const ebpo_accel *s, ebpo_accel_leaf *leaf,
+                                  const leaf_point *at, const double p[3], ebpo_inside_result *out,
+                                  ebpo_error *error)
+{
+    int32_t winding;
+    ebpo_leaf_kind kind = kind_of(context, s, leaf, at);
+    if (is_near_border(kind, leaf))
+        return result_near_border(context, s, leaf, at, p, out, error);
+    if (!ebpo_leaf_has_planes(kind) || !from_planes(s, leaf, at, &winding))
+        return result_by_faces(context, s, leaf, ebpo_leaf_is_bounded(kind), at, p, out, error);
+    give_winding(context, winding, out);
+    return EBPO_OK;
+}
+
+/* Classifies p in leaf `index` of a subtree. The leaf is at this level, p is in the leaf's cell,
+ * and `position` is p's shifted position. */
+static ebpo_status inside_leaf(ebpo_context *context, const ebpo_accel *s, uint32_t index,
+                               int level, const ebpo_position *position, const double p[3],
+                               ebpo_inside_result *out, ebpo_error *error)
+{
+    leaf_point at;
+    find_leaf_point(context->model->locator.level, level, position, &at);
+    return result_in_leaf(context, s, &s->leaf[index], &at, p, out, error);
+}
+
+/* In a surface, classifies a point in a white node with any mark (ebpo_uniform_mark). */
+static __attribute__((noinline)) void inside_marked(const ebpo_context *context,
+                                                    const ebpo_node_table *table, uint32_t entry,
+                                                    const ebpo_position *position, int level,
+                                                    const double p[3], ebpo_inside_result *out)
+{
+    int deepest = context->model->locator.level;
+    int32_t marked =
+        ebpo_marked_part(table, ebpo_entry_winding(entry), position->at, deepest, deepest, &level);
+    decide_without_faces(context, table, marked, level, position, p, out);
+}
+
+/* Classifies a point in a white or black node, if all its points have the same result. Returns
+ * false otherwise. */
+static inline bool give_uniform(const ebpo_context *context, uint32_t entry,
+                                ebpo_inside_result *out)
 {
     int32_t value = ebpo_entry_winding(entry);
+    bool same = true;
     if (!context->model->holes)
         give_winding(context, value, out);
     else if (ebpo_entry_mark(value) <= EBPO_MARK_IN && !context->undecided)
         give_marked(value, out);
     else
+        same = false;
+    return same;
+}
+
+/* Classifies a point in a white or black node of a table. */
+static inline void inside_uniform(const ebpo_context *context, const ebpo_node_table *table,
+                                  uint32_t entry, const ebpo_position *position, int level,
+                                  const double p[3], ebpo_inside_result *out)
+{
+    if (!give_uniform(context, entry, out))
         inside_marked(context, table, entry, position, level, p, out);
 }
 
@@ -448,6 +548,27 @@ typedef struct waiting {
     leaf_point in;
 } waiting;
 
+/* A point near the border of a surface. Such points are few. They are gathered and then decided
+ * together: the processor fetches the data for all of them at a time, and the code for these
+ * decisions stays in its caches. */
+typedef struct later_point {
+    const ebpo_accel_leaf *leaf; /* NULL: a white node */
+    leaf_point in;               /* of a white node: only `position` is valid */
+    ebpo_position position;
+    int32_t marked; /* mark of the leaf or node, then of its part that contains the point */
+    int level;      /* level of this cell */
+    const ebpo_near_cell *near; /* the record of the part, or NULL */
+    const double *p;
+    ebpo_inside_result *out;
+} later_point;
+
+/* The points that wait for their decision. */
+enum { LATER_MAX = 64 };
+typedef struct later_points {
+    unsigned count;
+    later_point point[LATER_MAX];
+} later_points;
+
 /* Begins the way down of each point. */
 static void start_lanes(const ebpo_accel *s, const ebpo_locator *locator, const double *points,
                         unsigned count, lane *l)
@@ -478,16 +599,11 @@ static void descend_together(const ebpo_accel *s, int deepest, unsigned count, l
     }
 }
 
-/* Prefetches the cache lines of the blocks that the point's segment may intersect. */
-static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double p[3])
+/* Prefetches the cache lines of the leaf's blocks that a segment with this `reach`
+ * (ebpo_axis_segment) may intersect. */
+static void prefetch_blocks(const ebpo_accel *s, const ebpo_accel_leaf *leaf, uint32_t reach)
 {
-    const ebpo_accel_leaf *leaf = w->leaf;
-    ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
-    ebpo_axis_segment g = { .reach = EBPO_REACH_ALL };
-    if (ebpo_leaf_has_planes(kind))
-        return;
-    if (ebpo_leaf_is_bounded(kind) && leaf->cell_face < EBPO_NO_CELL_FACE)
-        g = cell_face_segment(&s->box, leaf->cell_face, &w->in, p);
+    const ebpo_axis_segment g = { .reach = reach };
     const ebpo_listed_block *list = s->list + leaf->list;
     for (int b = 0; b < 8; b++) {
         uint64_t listed = ebpo_listed(list + b);
@@ -500,28 +616,123 @@ static void prefetch_blocks(const ebpo_accel *s, const waiting *w, const double 
     }
 }
 
-/* Decides the points whose way down ended in a leaf. */
-static ebpo_status result_waiting(ebpo_context *context, const ebpo_accel *s, const waiting *w,
-                                  unsigned count, const double *points, ebpo_inside_result *out,
-                                  ebpo_error *error)
+/* Prefetches the cache lines of the blocks that the point's segment may intersect. */
+static void prefetch_leaf(const ebpo_accel *s, const waiting *w, const double p[3])
 {
-    for (unsigned i = 0; i < count; i++) {
-        __builtin_prefetch(s->list + w[i].leaf->list);
-        if (ebpo_leaf_has_planes(ebpo_leaf_kind_of(w[i].leaf)))
-            __builtin_prefetch(EBPO_KIND_ROW(s->kinds, w[i].leaf->rows));
+    const ebpo_accel_leaf *leaf = w->leaf;
+    ebpo_leaf_kind kind = ebpo_leaf_kind_of(leaf);
+    uint32_t reach = EBPO_REACH_ALL;
+    if (ebpo_leaf_has_planes(kind))
+        return;
+    if (ebpo_leaf_is_bounded(kind) && leaf->cell_face < EBPO_NO_CELL_FACE)
+        reach = cell_face_segment(&s->box, leaf->cell_face, &w->in, p).reach;
+    prefetch_blocks(s, leaf, reach);
+}
+
+/* Prefetches the record of a mark, or the marks of its parts. */
+static void prefetch_mark(const ebpo_node_table *table, int32_t marked)
+{
+    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
+    int32_t value = ebpo_marked_value(marked);
+    if (mark == EBPO_MARK_SPLIT) {
+        __builtin_prefetch(table->split[value]);
+    } else if (mark == EBPO_MARK_LISTED || mark == EBPO_MARK_FACES_LISTED) {
+        __builtin_prefetch(&table->near[value]);
+        __builtin_prefetch((const char *)(&table->near[value] + 1) - 1);
     }
-    for (unsigned i = 0; i < count; i++)
-        prefetch_blocks(s, &w[i], points + 3 * w[i].point);
+}
+
+/* Adds a point to those that wait. `leaf`: NULL for a white node. */
+static void put_later(later_points *later, const ebpo_accel *s, const waiting *leaf,
+                      const ebpo_position *position, int32_t marked, int level, const double *p,
+                      ebpo_inside_result *out)
+{
+    later_point *l = &later->point[later->count++];
+    l->leaf = leaf ? leaf->leaf : NULL;
+    if (leaf)
+        l->in = leaf->in;
+    l->position = *position;
+    l->in.position = &l->position;
+    l->marked = marked;
+    l->level = level;
+    l->near = NULL;
+    l->p = p;
+    l->out = out;
+    prefetch_mark(&s->nodes, marked);
+}
+
+/* Finds the part that contains the point, and prefetches its record or the list of its blocks. */
+static void find_part(const ebpo_context *context, const ebpo_accel *s, later_point *l)
+{
+    int deepest = context->model->locator.level;
+    l->marked = ebpo_marked_part(&s->nodes, l->marked, l->position.at, deepest, deepest, &l->level);
+    ebpo_uniform_mark mark = ebpo_entry_mark(l->marked);
+    if (mark == EBPO_MARK_LISTED || mark == EBPO_MARK_FACES_LISTED)
+        l->near = &s->nodes.near[ebpo_marked_value(l->marked)];
+    if (l->near)
+        prefetch_mark(&s->nodes, l->marked);
+    if (mark >= EBPO_MARK_FACES)
+        __builtin_prefetch(s->list + l->leaf->list);
+}
+
+/* Decides the points that wait. */
+static ebpo_status decide_later(ebpo_context *context, const ebpo_accel *s, later_points *later,
+                                ebpo_error *error)
+{
+    const ebpo_cap_tree *caps = &context->model->holes->caps;
+    const later_point *end = later->point + later->count;
     ebpo_status status = EBPO_OK;
-    for (unsigned i = 0; i < count && status == EBPO_OK; i++)
+    for (later_point *l = later->point; l < end; l++)
+        find_part(context, s, l);
+    for (const later_point *l = later->point; l < end; l++) {
+        if (l->near)
+            __builtin_prefetch(s->nodes.disc + l->near->first);
+        if (ebpo_entry_mark(l->marked) >= EBPO_MARK_FACES)
+            prefetch_blocks(s, l->leaf, EBPO_REACH_ALL);
+    }
+    for (const later_point *l = later->point; l < end; l++)
+        if (l->near)
+            ebpo_cap_list_prefetch(caps, s->nodes.disc + l->near->first, l->near->nearest);
+    for (const later_point *l = later->point; l < end && status == EBPO_OK; l++)
+        status =
+            result_in_part(context, s, l->leaf, l->marked, l->level, &l->in, l->p, l->out, error);
+    later->count = 0;
+    return status;
+}
+
+/* Decides the points whose way down ended in a leaf. Those near the border are added to `later`. */
+static ebpo_status result_waiting(ebpo_context *context, const ebpo_accel *s, waiting *w,
+                                  unsigned count, const double *points, later_points *later,
+                                  ebpo_inside_result *out, ebpo_error *error)
+{
+    unsigned kept = 0;
+    for (unsigned i = 0; i < count; i++) {
+        const ebpo_accel_leaf *leaf = w[i].leaf;
+        if (is_near_border(ebpo_leaf_kind_of(leaf), leaf)) {
+            put_later(later, s, &w[i], w[i].in.position, (int32_t)leaf->rows, w[i].in.leaf.level,
+                      points + 3 * w[i].point, &out[w[i].point]);
+            continue;
+        }
+        __builtin_prefetch(s->list + leaf->list);
+        if (ebpo_leaf_has_planes(ebpo_leaf_kind_of(leaf)))
+            __builtin_prefetch(EBPO_KIND_ROW(s->kinds, leaf->rows));
+        if (kept < i)
+            w[kept] = w[i];
+        kept++;
+    }
+    for (unsigned i = 0; i < kept; i++)
+        prefetch_leaf(s, &w[i], points + 3 * w[i].point);
+    ebpo_status status = EBPO_OK;
+    for (unsigned i = 0; i < kept && status == EBPO_OK; i++)
         status = result_in_leaf(context, s, w[i].leaf, &w[i].in, points + 3 * w[i].point,
                                 &out[w[i].point], error);
     return status;
 }
 
-/* Classifies at most POINTS_TOGETHER points. */
+/* Classifies at most POINTS_TOGETHER points. Those near the border are added to `later`. */
 static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, const double *points,
-                                   unsigned count, ebpo_inside_result *out, ebpo_error *error)
+                                   unsigned count, later_points *later, ebpo_inside_result *out,
+                                   ebpo_error *error)
 {
     lane l[POINTS_TOGETHER];
     waiting w[POINTS_TOGETHER];
@@ -533,8 +744,9 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
         if (!l[i].within) {
             inside_beyond_root(context, points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_UNIFORM) {
-            inside_uniform(context, &s->nodes, l[i].d.entry, &l[i].position, l[i].d.level,
-                           points + 3 * i, &out[i]);
+            if (!give_uniform(context, l[i].d.entry, &out[i]))
+                put_later(later, s, NULL, &l[i].position, ebpo_entry_winding(l[i].d.entry),
+                          l[i].d.level, points + 3 * i, &out[i]);
         } else if (ebpo_entry_kind_of(l[i].d.entry) == EBPO_ENTRY_SUBTREE_ROOT) {
             ebpo_status status = inside_pruned(context, points + 3 * i, &out[i], error);
             if (status != EBPO_OK)
@@ -547,7 +759,7 @@ static ebpo_status inside_together(ebpo_context *context, const ebpo_accel *s, c
             leaves++;
         }
     }
-    return result_waiting(context, s, w, leaves, points, out, error);
+    return result_waiting(context, s, w, leaves, points, later, out, error);
 }
 
 /* Classifies points with the whole tree in memory. */
@@ -563,11 +775,16 @@ static ebpo_status inside_whole(ebpo_context *context, const double *points, uin
         else
             inside_beyond_root(context, points, out);
     }
-    for (uint64_t i = 0; count > 1 && i < count && status == EBPO_OK; i += POINTS_TOGETHER)
-        status =
-            inside_together(context, s, points + 3 * i,
-                            count - i < POINTS_TOGETHER ? (unsigned)(count - i) : POINTS_TOGETHER,
-                            out + i, error);
+    later_points later;
+    later.count = 0;
+    for (uint64_t i = 0; count > 1 && i < count && status == EBPO_OK; i += POINTS_TOGETHER) {
+        unsigned group = count - i < POINTS_TOGETHER ? (unsigned)(count - i) : POINTS_TOGETHER;
+        status = inside_together(context, s, points + 3 * i, group, &later, out + i, error);
+        if (status == EBPO_OK && later.count > LATER_MAX - POINTS_TOGETHER)
+            status = decide_later(context, s, &later, error);
+    }
+    if (status == EBPO_OK && later.count)
+        status = decide_later(context, s, &later, error);
     if (status == EBPO_OK && done)
         memset(done, true, count);
     return status;

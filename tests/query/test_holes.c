@@ -814,6 +814,47 @@ START_TEST(test_levels_agree_or_are_undecided)
 }
 END_TEST
 
+/* Adds the volumes of the parts of a leaf, relative to the leaf, to of_mark[mark]. Recursive. */
+static void add_parts(const ebpo_node_table *t, int32_t marked, double volume, double of_mark[8])
+{
+    ebpo_uniform_mark mark = ebpo_entry_mark(marked);
+    if (mark != EBPO_MARK_SPLIT)
+        of_mark[mark] += volume;
+    for (int octant = 0; mark == EBPO_MARK_SPLIT && octant < 8; octant++)
+        add_parts(t, t->split[ebpo_marked_value(marked)][octant], volume / 8, of_mark);
+}
+
+/* Returns true if the tree has a leaf at a position of the grid. */
+static bool is_leaf(const ebpo_node_table *t, const uint32_t at[3])
+{
+    uint32_t entry = t->root;
+    for (int up = t->grid_bits; ebpo_entry_kind_of(entry) == EBPO_ENTRY_GRAY && up-- > 0;)
+        entry = ebpo_table_child(t, entry, ebpo_octant_at(at, up));
+    return ebpo_entry_kind_of(entry) == EBPO_ENTRY_LEAF;
+}
+
+/* Checks that parts of leaves near the border that no face touches are decided by a mark, and that
+ * the grid has some of these parts, so that queries do not visit the leaf. */
+static void check_parts_of_leaves(const ebpo_accel *s)
+{
+    const ebpo_node_table *t = &s->nodes;
+    double of_mark[8] = { 0 }, sum = 0;
+    uint64_t in_grid = 0, i = 0;
+    uint32_t side = 1u << t->grid_bits, at[3];
+    for (uint32_t k = 0; k < s->leaf_count; k++)
+        if (s->leaf[k].cell_face == EBPO_NEAR_BORDER)
+            add_parts(t, (int32_t)s->leaf[k].rows, 1, of_mark);
+    for (int mark = 0; mark < 8; mark++)
+        sum += of_mark[mark];
+    for (at[2] = 0; at[2] < side; at[2]++)
+        for (at[1] = 0; at[1] < side; at[1]++)
+            for (at[0] = 0; at[0] < side; at[0]++, i++)
+                in_grid += ebpo_entry_kind_of(t->grid[i]) == EBPO_ENTRY_UNIFORM && is_leaf(t, at);
+    ck_assert_double_gt(of_mark[EBPO_MARK_OUT] + of_mark[EBPO_MARK_IN], sum / 12);
+    ck_assert_double_lt(of_mark[EBPO_MARK_NEAR] + of_mark[EBPO_MARK_FACES_NEAR], sum / 1000);
+    ck_assert_uint_gt(in_grid, 0);
+}
+
 /* Checks that few caps of the lists of cells near the border are the nearest or touch the cell, so
  * that queries visit few caps; that the errors of far caps are small; and that the grid has the
  * marks of parts of white nodes. */
@@ -858,6 +899,7 @@ START_TEST(test_marks_take_few_terms)
     ck_assert_msg(terms > leaves && terms < TERMS_OF_LEAF * leaves, "%llu terms for %llu leaves",
                   (unsigned long long)terms, (unsigned long long)leaves);
     check_lists(&h.model->whole->nodes);
+    check_parts_of_leaves(h.model->whole);
     holed_free(&h);
 }
 END_TEST
