@@ -107,32 +107,16 @@ typedef struct projected {
     f8 x[3], y[3], z[3];
 } projected;
 
-/* Corners of eight faces, [axis][corner]. */
-typedef struct ray_corners {
-    f8 axis[3][3];
-} ray_corners;
-
-/* Transforms coordinates of corners on one axis to the subtree's frame, relative to the origin. */
-EBPO_EIGHT void ray_relative(const ebpo_ray_search *r, int axis, const f8 from[3], f8 to[3])
+/* Reads the corners' coordinates on one axis, relative to the origin, in the subtree's frame. */
+EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis, bool wide,
+                         f8 corner[3])
 {
-    for (int i = 0; i < 3; i++)
-        to[i] =
-            f8_mul(f8_sub(f8_sub(from[i], f8_all(r->from_high[axis])), f8_all(r->from_low[axis])),
-                   f8_all((float)r->s->scale));
-}
-
-/* Reads the corners' coordinates on one axis, relative to the origin, in the subtree's frame.
- * `relative`: these coordinates, if the caller has computed them, or NULL. */
-EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int axis,
-                         const ray_corners *relative, bool wide, f8 corner[3])
-{
-    if (relative) {
-        memcpy(corner, relative->axis[axis], sizeof relative->axis[axis]);
-        return;
-    }
     if (!wide) {
+        f8 high = f8_all(r->from_high[axis]), low = f8_all(r->from_low[axis]),
+           scale = f8_all((float)r->s->scale);
         ebpo_face_block_floats(b, axis, corner);
-        ray_relative(r, axis, corner, corner);
+        for (int i = 0; i < 3; i++)
+            corner[i] = f8_mul(f8_sub(f8_sub(corner[i], high), low), scale);
         return;
     }
     double x[3][EBPO_BLOCK];
@@ -145,13 +129,12 @@ EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int
     }
 }
 
-EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b,
-                              const ray_corners *relative, bool wide)
+EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b, bool wide)
 {
     projected out;
-    ray_axis(r, b, r->axis[2], relative, wide, out.z);
-    ray_axis(r, b, r->axis[0], relative, wide, out.x);
-    ray_axis(r, b, r->axis[1], relative, wide, out.y);
+    ray_axis(r, b, r->axis[2], wide, out.z);
+    ray_axis(r, b, r->axis[0], wide, out.x);
+    ray_axis(r, b, r->axis[1], wide, out.y);
     for (int i = 0; i < 3; i++) {
         out.x[i] = f8_sub(out.x[i], f8_mul(out.z[i], f8_all(r->shear[0])));
         out.y[i] = f8_sub(out.y[i], f8_mul(out.z[i], f8_all(r->shear[1])));
@@ -200,11 +183,10 @@ typedef struct ray_lanes {
 
 /* Tests eight faces. Comparisons are written so that a lane with a NaN stays alive and is not
  * certain. */
-EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, const ray_corners *relative,
-                          ray_lanes *out, bool wide)
+EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *out, bool wide)
 {
     ebpo_face_block faces = ebpo_face_block_open(r->s, block);
-    projected a = ray_view(r, &faces, relative, wide);
+    projected a = ray_view(r, &faces, wide);
     f8 zero = f8_all(0), least_z = f8_min3(a.z[0], a.z[1], a.z[2]),
        max_z = f8_max3(a.z[0], a.z[1], a.z[2]);
     f8 size_z = f8_add(f8_max(f8_abs(least_z), f8_abs(max_z)), f8_all(r->blur));
@@ -251,9 +233,8 @@ static void drop_beyond(ebpo_ray_search *r)
 }
 
 /* Visits a block: adds its possible hits to the candidates, and lowers the limit to certain hits.
- * `relative`: see ray_axis. */
-EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, const ray_corners *relative,
-                          bool wide)
+ */
+EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
 {
     ray_lanes found;
     const ebpo_meshlet *m = ebpo_accel_meshlet(r->s, block);
@@ -261,7 +242,7 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, const ray_corners 
      * their number. */
     for (int i = 1; i < (wide ? 6 : 4); i++)
         __builtin_prefetch((const char *)m + EBPO_MESHLET_UNIT * i);
-    ray_faces(r, block, relative, &found, wide);
+    ray_faces(r, block, &found, wide);
     if (!found.alive)
         return;
     if (r->wants == EBPO_WANTS_ANY && found.sure) {
@@ -367,7 +348,7 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stac
             child = ray_enter(s, stack, &top, b, lanes, enter, wide, sorted);
         }
         if (child & EBPO_IS_BLOCK)
-            ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
+            ray_block(r, child & ~EBPO_IS_BLOCK, wide);
     }
 }
 
@@ -1017,7 +998,7 @@ EBPO_EIGHT bool ray_take_turn(ray_turn *w, bool wide, bool sorted)
     uint32_t top = w->top, child = w->next;
     for (;;) {
         if (child & EBPO_IS_BLOCK) {
-            ray_block(r, child & ~EBPO_IS_BLOCK, NULL, wide);
+            ray_block(r, child & ~EBPO_IS_BLOCK, wide);
         } else {
             f8 enter;
             const ebpo_bound *b = &s->bound[child];
