@@ -56,6 +56,7 @@ EBPO_MUST_USE ebpo_status ebpo_pick_attributes(ebpo_chunks *chunks, ebpo_attribu
  * EBPO_PART_MAPS, also adds the source indices of faces and vertices. */
 void ebpo_faces_hint(ebpo_chunks *chunks, ebpo_hints *hints, const uint32_t *faces, uint64_t count,
                      uint32_t parts);
+
 /* Sends prefetch hints for reading these vertices of the mesh and, if `parts` has EBPO_PART_MAPS,
  * their source indices. */
 void ebpo_vertices_hint(ebpo_chunks *chunks, const uint32_t *vertices, uint64_t count,

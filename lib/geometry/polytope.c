@@ -498,7 +498,10 @@ ebpo_clip ebpo_polytope_clip(ebpo_polytope *p, const double n[3], double d, int3
 
 /* --- halves and children --- */
 
-bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side, ebpo_polytope *out)
+/* Not inlined in ebpo_polytope_child: there, a copy for each of three calls takes 25 KiB of stack.
+ */
+__attribute__((noinline)) bool ebpo_polytope_half(const ebpo_polytope *p, int axis, int side,
+                                                  ebpo_polytope *out)
 {
     cut c;
     double scaled[EBPO_POLYTOPE_VERTICES][3];

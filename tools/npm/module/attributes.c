@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "format/pick_rows.h"
+#include "format/reader.h"
 #include "mesh/attributes.h"
 #include "module.h"
 
@@ -107,7 +108,9 @@ int EBPO_JS(ebpo_js_corners)(ebpo_js_object *object, const double *faces, uint32
     status = ebpo_js_need_chunks(object);
     if (status != EBPO_OK || !count)
         return status;
-    ebpo_faces_hint(object->chunks, numbers, count, 0);
+    ebpo_hints hints = EBPO_HINTS_INIT(object->chunks->file);
+    ebpo_faces_hint(object->chunks, &hints, numbers, count, 0);
+    ebpo_hint_all(&hints);
     status = ebpo_pick_rows(object->chunks, EBPO_A_FACES, numbers, count, 1, rows, &object->error);
     return status == EBPO_OK ? ebpo_pick_rows(object->chunks, EBPO_A_VERTICES, rows,
                                               3 * (uint64_t)count, 1, corners, &object->error)

@@ -8,6 +8,7 @@
 #include "format/face_colours.h"
 #include "format/file_in.h"
 #include "format/pick_rows.h"
+#include "format/reader.h"
 #include "format/schema.h"
 #include "format/subtree_index.h"
 #include "geometry/level_nodes.h"
@@ -243,7 +244,9 @@ static ebpo_status put_corners(ebpo_js_object *object)
         return EBPO_E_MEMORY;
     if (!count)
         return EBPO_OK;
-    ebpo_faces_hint(object->chunks, faces, count, 0);
+    ebpo_hints hints = EBPO_HINTS_INIT(object->chunks->file);
+    ebpo_faces_hint(object->chunks, &hints, faces, count, 0);
+    ebpo_hint_all(&hints);
     ebpo_status status =
         ebpo_pick_rows(object->chunks, EBPO_A_FACES, faces, count, 1, vertices, &object->error);
     if (status != EBPO_OK)
