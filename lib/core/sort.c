@@ -20,7 +20,7 @@ enum {
     /* approximate maximum number of groups; limited, because the second pass writes to all groups
      * at the same time */
     GROUPS_MAX = 1024,
-    GRAIN = 1 << 14,     /* number of records that a thread takes at a time */
+    GRAIN = 1 << 13,     /* number of records that a thread takes at a time */
     DIGIT = 256,         /* number of values of a digit of a key */
     ALONE_MAX = 1 << 12, /* up to this number, all records are sorted as one group */
     RELEASE_EVERY = 4    /* pages are released after this number of copies to groups */

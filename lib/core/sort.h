@@ -30,7 +30,8 @@ typedef struct ebpo_sort {
     unsigned shift; /* key >> shift is below EBPO_SORT_BINS for all keys */
     void *context;
     /* Makes the records [begin, end) of the unsorted order, and writes them to `records`. Called
-     * from any thread, and twice for each record, with the same result. */
+     * from any thread, and twice for each record. The keys of both calls must be the same: the
+     * first call decides how much memory a group of keys has. */
     ebpo_status (*make)(void *context, uint64_t begin, uint64_t end, void *records,
                         ebpo_error *error);
     /* Compares two different records with equal keys. Returns a number below 0 if `a` comes first,

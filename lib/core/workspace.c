@@ -537,10 +537,10 @@ static bool should_release(const ebpo_workspace *w)
 }
 
 /* Returns false if this thread has had fewer than FAULTS_MIN page faults since the function last
- * returned true to it for this workspace. In most file systems, a fault maps at most 64 KiB of a
- * file. Reading the number of faults takes a third of the time of reading statm. The clock takes a
- * tenth of that time: a fault takes half a microsecond or more, so a thread has few faults within
- * PAUSE. */
+ * returned true to it for this workspace, or within PAUSE after it last read their number. In most
+ * file systems, a fault maps at most 64 KiB of a file. Reading the number of faults takes a third
+ * of the time of reading statm. The clock takes a tenth of that time: a fault takes half a
+ * microsecond or more, so a thread has few faults within PAUSE. */
 static bool has_faulted(const ebpo_workspace *w)
 {
 #ifdef EBPO_HAVE_RUSAGE_THREAD

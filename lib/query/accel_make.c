@@ -629,8 +629,9 @@ static void *move_array(char **to, void *array, uint64_t bytes)
 
 /* Moves the arrays of a subtree to one allocation. A cache of subtrees frees and allocates all the
  * time. With an allocation for each array, the free memory is soon in many small pieces, and the
- * allocator takes up to a third of the time of a load to find pieces that fit. Does nothing if the
- * quota is too small for the subtree and copies of its arrays, or if memory is short. */
+ * allocator takes up to a third of the time of a load to find pieces that fit. Does nothing without
+ * a quota, for a subtree that is not kept; if the quota is too small for the subtree and copies of
+ * its arrays; or if memory is short. */
 static void join_arrays(ebpo_accel *s, const ebpo_quota *space)
 {
     uint64_t meshlets = (s->units + 1) * EBPO_MESHLET_UNIT,
@@ -646,7 +647,7 @@ static void join_arrays(ebpo_accel *s, const ebpo_quota *space)
              all = meshlets + bounds + cylinders + list + leaves + shared + source + first + planes;
     all = (all + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT * EBPO_MESHLET_UNIT;
     s->arrays =
-        space && s->bytes + all > space->most ? NULL : aligned_alloc(EBPO_MESHLET_UNIT, all);
+        !space || s->bytes + all > space->most ? NULL : aligned_alloc(EBPO_MESHLET_UNIT, all);
     if (!s->arrays)
         return;
     /* in the order of the alignments, so that there is no space between the arrays */

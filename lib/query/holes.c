@@ -81,8 +81,9 @@ typedef struct marked_face {
     double corner[3][3], low[3], high[3];
 } marked_face;
 
-/* A leaf with more faces is not split. */
-enum { SPLIT_FACES_MAX = 1024 };
+/* A leaf with more faces is not split. (The lists of its faces are small, and count in no budget.)
+ */
+enum { SPLIT_FACES_MAX = 128 };
 
 typedef struct marking {
     const ebpo_holes *holes;

@@ -920,7 +920,7 @@ static ebpo_status leaf_from_file(inside_query *query, const ebpo_node *leaf,
 {
     ebpo_model *m = query->context->model;
     ebpo_slice slice;
-    ebpo_accel *subtree;
+    ebpo_accel *subtree = NULL;
     ebpo_status status = ebpo_model_has_capacity(m, leaf, error);
     if (status == EBPO_OK)
         status = ebpo_slice_read(&slice, m->chunks, leaf, error);
@@ -937,8 +937,8 @@ static ebpo_status leaf_from_file(inside_query *query, const ebpo_node *leaf,
         status = inside_leaf(query->context, subtree, ebpo_entry_value(subtree->nodes.root),
                              leaf->cell.level, &query->position, query->p, out, error);
         ebpo_model_count_leaves(m, subtree, -1);
-        ebpo_accel_free(subtree);
     }
+    ebpo_accel_free(subtree);
     return status;
 }
 

@@ -53,9 +53,10 @@ void ebpo_top_free(ebpo_top *top);
 uint64_t ebpo_top_estimate(const ebpo_info *info, int cut_level);
 uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 
-/* For a remote file with a table of subtrees: sends one prefetch hint for `count` subtrees, by
- * their indices in top->below. A leaf that is in no subtree of the file is loaded like a subtree.
- * `needs`: EBPO_NEEDS_... (schema.h). */
+/* For a remote file with a table of subtrees: sends prefetch hints for `count` subtrees, by their
+ * indices in top->below. A leaf that is in no subtree of the file is loaded like a subtree; its
+ * list of faces is read here, because only this list names the faces that it shares with other
+ * leaves. `needs`: EBPO_NEEDS_... (schema.h). */
 void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *below, uint64_t count,
                    uint32_t needs);
 

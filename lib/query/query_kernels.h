@@ -285,7 +285,7 @@ typedef struct ebpo_ray_group {
     ebpo_ray_search *(*begin)(void *user, unsigned i);
     void *user;
     /* Set by walk_many: the candidates of rays whose search is not begun. The caller must test
-     * them. */
+     * them. (During the walk of a packet, also those of other rays.) */
     ebpo_ray_few few[EBPO_RAY_GROUP];
     /* Space for walk_many. Without the additional visits, the beginnings of all rows would compete
      * for the same lines of the processor's cache. */

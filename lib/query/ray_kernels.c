@@ -174,7 +174,7 @@ EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
 typedef struct ray_lanes {
     float low[8], high[8]; /* bounds of t of possible hits */
     /* alive: faces that may be hit at a t of 0 to the limit; sure: faces that are certainly hit at
-     * such a t */
+     * such a t (in a packet: at a t of 0 or more) */
     unsigned alive, sure;
     /* faces through whose interior the ray's line certainly goes, from the front or from the back
      */
@@ -467,8 +467,10 @@ EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *r
         d_least[k] = d_most[k] = v4d_all(ray->direction[k]);
     }
     for (unsigned i = 0; i < count; i += 4) {
-        const ebpo_ray *a = ray + i, *last = ray + count - 1, *x = a + 1 < last ? a + 1 : last,
-                       *y = a + 2 < last ? a + 2 : last, *z = a + 3 < last ? a + 3 : last;
+        unsigned last = count - 1;
+        const ebpo_ray *a = ray + i, *x = ray + (i + 1 < last ? i + 1 : last),
+                       *y = ray + (i + 2 < last ? i + 2 : last),
+                       *z = ray + (i + 3 < last ? i + 3 : last);
         for (int k = 0; k < 3; k++) {
             v4d o = { a->origin[k], x->origin[k], y->origin[k], z->origin[k] },
                 d = { a->direction[k], x->direction[k], y->direction[k], z->direction[k] };
@@ -1098,14 +1100,15 @@ static void packet_read_begun(ray_packet *p, packet_frame *f)
 }
 
 /* Walks with the rays of a packet, if they are similar. Otherwise adds their searches to `other`.
- */
+ * An origin that is too far for the frame (set_error in rays.c) is unknown there, so its ray cannot
+ * be compared with other rays. */
 static void ray_walk_packet(ray_packet *p, ebpo_ray_search **other, unsigned *others)
 {
     const ebpo_accel *s = p->g->s;
     if (p->count > 1 && p->g->wants == EBPO_WANTS_FIRST && !(s->root_bound & EBPO_IS_BLOCK)) {
         if (!packet_read(p, &p->frame))
             packet_read_begun(p, &p->frame);
-        if (packet_is_coherent(&p->frame, s)) {
+        if (p->frame.error < (double)EBPO_RAY_BEYOND && packet_is_coherent(&p->frame, s)) {
             packet_set(p);
             packet_set_faces(p, s);
             packet_walk(p, s, p->g->stack[0]);

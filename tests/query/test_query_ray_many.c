@@ -289,6 +289,34 @@ START_TEST(test_coherent_rays_match_single_rays)
 }
 END_TEST
 
+/* Origins so far away that the frame of the model cannot hold them: these rays are not similar. */
+START_TEST(test_far_rays_match_single_rays)
+{
+    enum { RAYS = 8 };
+    query_model m;
+    ebpo_ray rays[RAYS];
+    ebpo_ray_hit together[RAYS], single;
+    uint64_t hits = 0;
+    query_model_make(&m, "torus", ebpo_test_torus(2, 0.7, 32, 16), &query_variants[0]);
+    for (int e = 20; e <= 140; e++) {
+        ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+        options.threads = 1;
+        for (int i = 0; i < RAYS; i++)
+            rays[i] = (ebpo_ray){ { i ? 1.5 + i * 0.125 : ldexp(1, e - e % 4), 0.07, ldexp(1, e) },
+                                  { 0, 0, -1 },
+                                  INFINITY };
+        ASSERT_OK(ebpo_ray_first_many(m.context, rays, RAYS, &options, together, error));
+        for (int k = 0; k < RAYS; k++) {
+            ASSERT_OK(ebpo_ray_first_many(m.context, &rays[k], 1, &options, &single, error));
+            ck_assert_msg(same_hit(&together[k], &single), "ray %d, 2^%d", k, e);
+            hits += single.face != EBPO_NO_FACE;
+        }
+    }
+    ck_assert_uint_gt(hits, 500);
+    query_model_free(&m);
+}
+END_TEST
+
 /* Counts the searches that a group of rays begins. */
 static uint64_t begun;
 static ebpo_ray_search *(*uncounted_begin)(void *user, unsigned i);
@@ -610,6 +638,7 @@ TEST_SUITE(query_ray_many)
     tcase_set_timeout(tight, 600);
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
+    tcase_add_test(many, test_far_rays_match_single_rays);
     tcase_add_test(many, test_bundles_miss_together);
     tcase_add_test(many, test_coherent_rays_share_nodes);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);

@@ -288,7 +288,8 @@ static uint64_t bytes_read(const ebpo_file *file)
     return s.bytes_read;
 }
 
-/* Writes the needed content of a model's file, and adds what was read. target: greatest size in bytes; 0: no limit. */
+/* Writes the needed content of a model's file, and adds what was read. target: greatest size in
+ * bytes; 0: no limit. */
 static ebpo_status write_file(packing *p, uint64_t number, uint64_t target)
 {
     ebpo_scene_packed *out = &p->files[number];
