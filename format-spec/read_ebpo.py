@@ -735,8 +735,8 @@ def patch_triangles(code, count, vertices):
                 assert back <= len(origin), "a vertex of a patch"
                 corners.append(len(origin) - back if back else new(None))
             a, b, c = corners
-            ring = [add(b, a, c), add(a, c, b), add(c, b, a)]
-            for k in range(3):
+            ring = [add(b, a, c), add(a, c, b), add(c, b, a)] if len({a, b, c}) == 3 else []
+            for k in range(len(ring)):
                 join(ring[k - 1], ring[k])
             out.append((a, b, c))
             continue

@@ -338,12 +338,14 @@ static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
     s->next[s->head[from]] = after;
     s->head[from] = NONE;
     remove_dead_corners(s, to);
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 3; k++)
+        s->sum[to].nd[k] += s->sum[from].nd[k];
+    /* neighbouring patches need equal normals and colours of vertices that they share */
+    for (int k = 0; k < 3 && !v->fixed; k++) {
         v->normal[k] += u->normal[k];
         v->colour[k] += u->colour[k];
-        s->sum[to].nd[k] += s->sum[from].nd[k];
     }
-    v->weight += u->weight;
+    v->weight += v->fixed ? 0 : u->weight;
     for (int i = 0; i < 6; i++)
         s->sum[to].nn[i] += s->sum[from].nn[i];
     s->sum[to].dd += s->sum[from].dd;

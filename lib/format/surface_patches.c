@@ -94,9 +94,12 @@ static bool take_edge(open_edges *s, open_edge *out)
     return false;
 }
 
-/* Adds the edges of a triangle that was reached over no open edge. */
+/* Adds the edges of a triangle that was reached over no open edge. A triangle with equal corners
+ * has no edges. */
 static void add_first_edges(open_edges *s, const uint32_t t[3])
 {
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0])
+        return;
     uint32_t x = add_edge(s, t[1], t[0], t[2]), y = add_edge(s, t[0], t[2], t[1]),
              z = add_edge(s, t[2], t[1], t[0]);
     link_edges(s, x, y);
@@ -766,7 +769,7 @@ static const char *find_row_fault(const ebpo_info *info, const uint64_t *row, ui
     if (triangles == 0 || triangles > row[EBPO_PATCH_FACES] ||
         row[EBPO_PATCH_CODE_BYTES] < triangles || row[EBPO_PATCH_VERTICES] < 3 ||
         row[EBPO_PATCH_VERTICES] > 3 * row[EBPO_PATCH_FACES] ||
-        row[EBPO_PATCH_VERTICES] > INT32_MAX / 4)
+        row[EBPO_PATCH_VERTICES] >= INT32_MAX / 4)
         return "the counts of a patch are impossible";
     if (row[EBPO_PATCH_ERROR] > UINT64_C(1) << 34)
         return "the error of a patch is greater than the model";

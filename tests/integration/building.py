@@ -142,7 +142,7 @@ def same_bytes_and_bounded_memory(root, model):
         return
     check(not filed, "a large budget: without files")
     expected = slurp(place.out)
-    budgets = (("16G", 3), ("256MiB", 2), ("128MiB", 1), ("128MiB", 2), ("128MiB", 3))
+    budgets = (("16G", 3), ("192MiB", 2), ("128MiB", 1), ("128MiB", 2), ("128MiB", 3))
     for memory, threads in budgets[4:] if FEW else budgets:
         os.unlink(place.out)
         code, said, peak, filed = run(place.command(model, "-q", "--memory", memory, "--threads",

@@ -364,8 +364,38 @@ START_TEST(test_files_and_threads)
 }
 END_TEST
 
+/* Vertices that patches of a level share have the same normal and colour in each of them. */
+START_TEST(test_shared_vertices_are_equal)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_patch patch[9];
+    uint64_t shared = 0, count = 0;
+    build(&tree, waves(182, 92), 1);
+    ck_assert_uint_gt(tree.surface.patch_count, 2);
+    for (uint64_t i = 1; i < tree.surface.patch_count && count < 9; i++)
+        if (ebpo_octcode_level(tree.surface.patch[i * EBPO_PATCH_COLUMNS]) == 1)
+            must(ebpo_surface_decode(&tree.surface, &tree.info, i, &patch[count++], &error),
+                 "decode", &error);
+    for (uint64_t a = 0; a < count; a++)
+        for (uint64_t b = 0; b < a; b++)
+            for (uint64_t v = 0; v < patch[a].vertex_count; v++)
+                for (uint64_t w = 0; w < patch[b].vertex_count; w++)
+                    if (memcmp(patch[a].xyz + 3 * v, patch[b].xyz + 3 * w, 3 * sizeof(double)) ==
+                        0) {
+                        ck_assert_mem_eq(patch[a].normals + 3 * v, patch[b].normals + 3 * w,
+                                         3 * sizeof(float));
+                        shared++;
+                    }
+    ck_assert_uint_gt(shared, 50);
+    for (uint64_t i = 0; i < count; i++)
+        ebpo_patch_free(&patch[i]);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 /* Nearly all triangles of a closed patch need one byte, and readers compute normals that are on no
- * border. All normals are on the front of their triangles. */
+ * border. Few normals are on the back of their triangles. */
 START_TEST(test_codes_are_short)
 {
     ebpo_tree tree;
@@ -754,6 +784,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_covers);
     tcase_add_test(tests, test_joined_levels_are_closed);
     tcase_add_test(tests, test_files_and_threads);
+    tcase_add_test(tests, test_shared_vertices_are_equal);
     tcase_add_test(tests, test_codes_are_short);
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);

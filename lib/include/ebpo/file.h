@@ -468,7 +468,7 @@ typedef struct ebpo_surface {
     uint64_t *patch; /* [patch_count][EBPO_PATCH_COLUMNS] values of each patch */
     uint8_t *code;   /* [code_bytes] coded triangles, patch after patch */
     uint16_t *point; /* [vertex_count][3] coded coordinates */
-    uint8_t *normal; /* [vertex_count][2] coded unit normals */
+    uint8_t *normal; /* [vertex_count][2] coded unit normals; 0, 0: computed by readers */
     uint8_t *colour; /* [colour_count][3] red, green and blue; NULL: no colours */
 } ebpo_surface;
 
