@@ -142,11 +142,11 @@ static void set_matrices(ebpo_accel_pair *out, const double back[3][3])
  * range of floats. The walk then visits every pair of nodes. */
 static void visit_all_pairs(ebpo_accel_pair *out)
 {
+    static const double identity[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
     out->unit[0] = out->unit[1] = 1;
-    for (int i = 0; i < 9; i++)
-        out->turn[i / 3][i % 3] = i % 4 == 0;
+    memcpy(out->turn, identity, sizeof out->turn);
     out->place[0] = out->place[1] = out->place[2] = 0;
-    set_matrices(out, (const double(*)[3])out->turn);
+    set_matrices(out, identity);
     out->uncertainty = INFINITY;
     out->cylinders = out->apart = false;
 }
