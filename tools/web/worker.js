@@ -124,7 +124,9 @@ class OpenFile {
     }, (error) => {
       if (isOld())
         return;
-      this.caps = undefined; // the next view tries again
+      caps.loading = false;
+      if (error.code === 'NETWORK')
+        this.caps = undefined; // the next view tries again
       throw error;
     }));
   }

@@ -77,3 +77,19 @@ test('a view with a surface sends one tile, and a view without it sends envelope
     assert.ok(surface ? shown.size === 1 : shown.size > 0, [...shown].join());
   }
 });
+
+test('a damaged border is requested once, and again when caps are switched off and on', async () => {
+  const blob = new Blob([readFileSync(fileURLToPath(new URL('../../../format-spec/vectors/failed/border_nan.ebpo.h5', import.meta.url)))]), failed = [];
+  const want = { level: 99, mesh: false, pixels: 16, triangles: 2e6 }, view = { eye: [0, 0, 2], planes: [], pixels: 800 };
+  listeners.push((m) => m.file === 4 && m.type === 'failed' && failed.push(m.error.code));
+  const settledBy = (type, number) => heard((m) => m.file === 4 && m.type === type && (m.want ?? number) === number), located = heard((m) => m.file === 4 && m.type === 'located');
+  emit({ file: 4, type: 'open', opening: 1, what: blob, ahead: 1 << 16 });
+  await located;
+  for (const [number, caps, type, count] of [[1, true, 'failed', 1], [2, true, 'idle', 1], [3, true, 'idle', 1], [4, false, 'idle', 1], [5, true, 'failed', 2]]) {
+    const settled = settledBy(type, number);
+    emit({ file: 4, type: 'view', view, want: { ...want, number, caps } });
+    await settled;
+    await new Promise((done) => setTimeout(done, 50)); // a request would have failed by then
+    assert.deepEqual(failed, Array(count).fill('FORMAT'), `view ${number}`);
+  }
+});
