@@ -1,6 +1,7 @@
 """picture_shows.py FILE.png WIDTH HEIGHT [COLOUR..]: checks that a PNG has this size, a light border and darker
 pixels inside. With colours, the PNG must have pixels of each colour: red, green, blue, purple; -COLOUR means
-no such pixels. Supports filters 0 to 4 of 8-bit RGB.
+no such pixels. "smooth" means that neighbouring pixels of the object rarely differ much, and -smooth that they
+often do. Supports filters 0 to 4 of 8-bit RGB.
 """
 import struct
 import sys
@@ -53,6 +54,12 @@ IS = {
     "purple": lambda r, g, b: min(r, b) > 70 and g < 50,
 }
 for colour in sys.argv[4:]:
+    if colour.lstrip("-") == "smooth":
+        greens = [row[1::3] for row in rows]
+        steps = [abs(row[i + 1] - row[i]) for row in greens for i in range(2, width - 3) if max(row[i - 2:i + 4]) < 200]
+        share = sum(step > 4 for step in steps) / len(steps)
+        assert share > 0.03 if colour[0] == "-" else share < 0.01, f"{colour}: {share}"
+        continue
     count = sum(IS[colour.lstrip("-")](*row[i:i + 3]) for row in rows for i in range(0, 3 * width, 3))
     right = count == 0 if colour[0] == "-" else count > width * height // 2000
     assert right, f"{colour}: {count} pixels"
