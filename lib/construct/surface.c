@@ -856,6 +856,7 @@ static ebpo_status collect_patches(const surface_builder *b, ebpo_surface *out, 
         copy_patch(out, order[i], step);
     out->colour_count = out->colour ? out->vertex_count : 0;
     free(order);
+    made = made && ebpo_surface_add_up(out);
     if (made)
         return EBPO_OK;
     ebpo_surface_free(out);

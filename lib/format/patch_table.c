@@ -179,6 +179,8 @@ ebpo_status ebpo_patch_read(const ebpo_patch_table *table, ebpo_chunks *chunks, 
     ebpo_status status = ebpo_patches_take(table, chunks, &patch, 1, &one, error);
     if (status == EBPO_OK)
         status = ebpo_surface_decode(&one, &chunks->file->info, 0, out, error);
+    if (status == EBPO_E_FORMAT && one.patch)
+        status = ebpo_patch_code_fails(status, chunks->file->in.shown, error);
     ebpo_surface_free(&one);
     return status;
 }

@@ -185,10 +185,11 @@ typedef struct coder {
     const ebpo_patch_source *in;
     ebpo_patch_rows *out;
     open_edges edges;
-    /* [slots] hash table of directed edges: index in in->triangle of the corner where the edge
-     * begins; NONE: a free slot */
+    /* [slots] hash table of directed edges: index in in->triangle of the first corner where the
+     * edge begins; NONE: a free slot */
     uint32_t *corner;
     uint64_t slots;
+    uint32_t *same;   /* [triangles][3] next corner where the same directed edge begins, or NONE */
     bool *done;       /* [triangles] true: the triangle is encoded */
     uint32_t *number; /* [vertices] new number of each vertex of `in`; NONE: not used yet */
     uint32_t *vertex; /* [vertices] for each new number: the vertex of `in` */
@@ -214,35 +215,41 @@ static void put_number(coder *c, uint32_t value)
     put_byte(c, value);
 }
 
-static uint64_t edge_hash(uint32_t from, uint32_t to)
+/* Returns the corner after corner i in the same triangle. */
+static uint32_t next_corner(uint32_t i) { return i - i % 3 + (i + 1) % 3; }
+
+/* Returns the slot of a directed edge, or the free slot for it. */
+static uint64_t find_edge(const coder *c, uint32_t from, uint32_t to)
 {
-    return ebpo_hash_number((uint64_t)from << 32 | to);
+    const uint32_t *t = c->in->triangle;
+    uint64_t slot;
+    EBPO_HASH_FIND(slot, ebpo_hash_number((uint64_t)from << 32 | to), c->slots - 1,
+                   c->corner[slot] == NONE ||
+                       (t[c->corner[slot]] == from && t[next_corner(c->corner[slot])] == to));
+    return slot;
 }
 
-/* Enters the edges of all triangles into the hash table. */
+/* Enters the edges of all triangles into the hash table. Corners of the same edge are a list, in
+ * ascending order, because a degenerate mesh can have one edge in all its triangles. */
 static void enter_edges(coder *c)
 {
-    for (uint32_t i = 0; i < 3 * c->in->triangle_count; i++) {
-        uint32_t from = c->in->triangle[i], to = c->in->triangle[i - i % 3 + (i + 1) % 3];
-        uint64_t slot = edge_hash(from, to) & (c->slots - 1);
-        while (c->corner[slot] != NONE)
-            slot = (slot + 1) & (c->slots - 1);
+    const uint32_t *t = c->in->triangle;
+    for (uint32_t i = (uint32_t)(3 * c->in->triangle_count); i-- > 0;) {
+        uint64_t slot = find_edge(c, t[i], t[next_corner(i)]);
+        c->same[i] = c->corner[slot];
         c->corner[slot] = i;
     }
 }
 
-/* Returns the corner at which a directed edge begins in a triangle that is not yet encoded, or
- * NONE. */
+/* Returns the first corner at which a directed edge begins in a triangle that is not yet encoded,
+ * or NONE. Removes the corners before it from the edge's list, so all calls together visit each
+ * corner once. */
 static uint32_t find_corner(const coder *c, uint32_t from, uint32_t to)
 {
-    const uint32_t *t = c->in->triangle;
-    for (uint64_t slot = edge_hash(from, to) & (c->slots - 1); c->corner[slot] != NONE;
-         slot = (slot + 1) & (c->slots - 1)) {
-        uint32_t i = c->corner[slot];
-        if (t[i] == from && t[i - i % 3 + (i + 1) % 3] == to && !c->done[i / 3])
-            return i;
-    }
-    return NONE;
+    uint32_t *first = &c->corner[find_edge(c, from, to)];
+    while (*first != NONE && c->done[*first / 3] && c->same[*first] != NONE)
+        *first = c->same[*first]; /* the last corner stays, because it occupies the slot */
+    return *first != NONE && !c->done[*first / 3] ? *first : NONE;
 }
 
 /* Gives the vertex `former` of `in` the next new number, which is returned. */
@@ -412,6 +419,7 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
     coder c = { .in = source, .out = out, .slots = ebpo_hash_slots(6 * triangles) };
     memset(out, 0, sizeof *out);
     c.corner = ebpo_alloc(c.slots, sizeof *c.corner);
+    c.same = ebpo_alloc(triangles, 3 * sizeof *c.same);
     c.done = ebpo_alloc_zero(triangles, sizeof *c.done);
     c.number = ebpo_alloc(vertices, sizeof *c.number);
     c.vertex = ebpo_alloc(vertices, sizeof *c.vertex);
@@ -420,8 +428,8 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
     out->point = ebpo_alloc(vertices, 3 * sizeof *out->point);
     out->normal = ebpo_alloc(vertices, 2);
     out->colour = source->colour ? ebpo_alloc(vertices, 3) : NULL;
-    bool made = make_edges(&c.edges, triangles, vertices) && c.corner && c.done && c.number &&
-                c.vertex && c.from && point && out->point && out->normal &&
+    bool made = make_edges(&c.edges, triangles, vertices) && c.corner && c.same && c.done &&
+                c.number && c.vertex && c.from && point && out->point && out->normal &&
                 (out->colour || !source->colour);
     if (made) {
         memset(c.corner, 0xff, c.slots * sizeof *c.corner);
@@ -432,6 +440,7 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
     }
     free_edges(&c.edges);
     free(c.corner);
+    free(c.same);
     free(c.done);
     free(c.number);
     free(c.vertex);
@@ -641,6 +650,13 @@ static bool decode_triangles(decoder *d, uint64_t count, uint32_t *triangle)
     return d->code == d->end;
 }
 
+ebpo_status ebpo_patch_code_fails(ebpo_status as, const char *file, ebpo_error *error)
+{
+    return ebpo_fail_at(error, as, file, "/surface/triangles", -1,
+                        "the code of a patch is wrong: an earlier version of ebpo wrote it, or it "
+                        "is damaged; convert the model again with --parts=+surface");
+}
+
 static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, uint64_t code_bytes,
                                 ebpo_patch *out, ebpo_error *error)
 {
@@ -660,7 +676,7 @@ static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, u
         (rows->colour && !out->colours))
         status = ebpo_fail_memory(error, vertices * 48);
     if (status == EBPO_OK && !decode_triangles(&d, out->triangle_count, out->triangles))
-        status = ebpo_fail(error, EBPO_E_FORMAT, "/surface/triangles: wrong code of a patch");
+        status = ebpo_patch_code_fails(EBPO_E_FORMAT, "", error);
     if (status == EBPO_OK)
         decode_vertices(info, rows, &d, point, out);
     free_edges(&d.edges);
@@ -669,20 +685,29 @@ static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, u
     return status;
 }
 
+/* Sets *vertex and *code to the first vertex and the first byte of code of a patch. */
+static void find_first(const ebpo_surface *surface, uint64_t index, uint64_t *vertex,
+                       uint64_t *code)
+{
+    *vertex = surface->first ? surface->first[2 * index] : 0;
+    *code = surface->first ? surface->first[2 * index + 1] : 0;
+    for (uint64_t i = 0; i < index && !surface->first; i++) {
+        *vertex += surface->patch[EBPO_PATCH_COLUMNS * i + EBPO_PATCH_VERTICES];
+        *code += surface->patch[EBPO_PATCH_COLUMNS * i + EBPO_PATCH_CODE_BYTES];
+    }
+}
+
 ebpo_status ebpo_surface_decode(const ebpo_surface *surface, const ebpo_info *info, uint64_t index,
                                 ebpo_patch *out, ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    uint64_t vertex = 0, code = 0;
+    uint64_t vertex, code;
     *out = (ebpo_patch)EBPO_PATCH_INIT;
     if (index >= surface->patch_count)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "patch %llu: there are only %llu patches",
                          (unsigned long long)index, (unsigned long long)surface->patch_count);
-    const uint64_t *row = surface->patch;
-    for (uint64_t i = 0; i < index; i++, row += EBPO_PATCH_COLUMNS) {
-        vertex += row[EBPO_PATCH_VERTICES];
-        code += row[EBPO_PATCH_CODE_BYTES];
-    }
+    const uint64_t *row = surface->patch + EBPO_PATCH_COLUMNS * index;
+    find_first(surface, index, &vertex, &code);
     patch_rows rows = { surface->code + code, surface->normal + 2 * vertex,
                         surface->colour ? surface->colour + 3 * vertex : NULL,
                         surface->point + 3 * vertex };
@@ -739,7 +764,22 @@ void ebpo_surface_free(ebpo_surface *surface)
     free(surface->point);
     free(surface->normal);
     free(surface->colour);
+    free(surface->first);
     memset(surface, 0, sizeof *surface);
+}
+
+bool ebpo_surface_add_up(ebpo_surface *surface)
+{
+    uint64_t vertex = 0, code = 0, *first = ebpo_alloc(surface->patch_count, 2 * sizeof *first);
+    for (uint64_t i = 0; i < surface->patch_count && first; i++) {
+        const uint64_t *row = surface->patch + EBPO_PATCH_COLUMNS * i;
+        first[2 * i] = vertex;
+        first[2 * i + 1] = code;
+        vertex += row[EBPO_PATCH_VERTICES];
+        code += row[EBPO_PATCH_CODE_BYTES];
+    }
+    surface->first = first;
+    return first != NULL;
 }
 
 void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info)
@@ -818,8 +858,7 @@ static ebpo_status check_codes(const ebpo_check *check, const ebpo_surface *surf
         if (!made)
             status = ebpo_fail_memory(error, row[EBPO_PATCH_VERTICES] * 32);
         else if (!decode_triangles(&d, row[EBPO_PATCH_TRIANGLES], NULL))
-            status = ebpo_check_fail(check, -1, "/surface/triangles",
-                                     "the code of a patch is wrong", error);
+            status = ebpo_patch_code_fails(check->as, check->shown, error);
         free_edges(&d.edges);
         code = d.end;
     }
@@ -961,6 +1000,8 @@ static ebpo_status read_surface(const ebpo_file *file, int first_level, int last
     if (status != EBPO_OK)
         return status;
     select_levels(out, first_level, last_level, &vertex, &code);
+    if (!ebpo_surface_add_up(out))
+        return ebpo_fail_memory(error, out->patch_count * 2 * sizeof *out->first);
     uint64_t vertex_end = vertex + out->vertex_count;
     hint_rows(&hints, file, EBPO_A_SURFACE_TRIANGLES, code, code + out->code_bytes);
     hint_rows(&hints, file, EBPO_A_SURFACE_POINTS, vertex, vertex_end);

@@ -56,8 +56,15 @@ EBPO_MUST_USE ebpo_status ebpo_check_surface(const ebpo_check *check, const ebpo
 /* Checks the table of patches against the header's counts. Returns the error's text or NULL. */
 const char *ebpo_surface_fault(const ebpo_info *info, const ebpo_surface *surface);
 
+/* Returns `as`, with a message that a patch of the file (its shown name; "": not known) cannot be
+ * decoded. */
+ebpo_status ebpo_patch_code_fails(ebpo_status as, const char *file, ebpo_error *error);
+
 /* Returns EBPO_E_ABSENT, with a message that the file lacks the part `surface`. */
 ebpo_status ebpo_surface_absent(const ebpo_file *file, ebpo_error *error);
+
+/* Sets surface->first. Returns false if memory is short. */
+EBPO_MUST_USE bool ebpo_surface_add_up(ebpo_surface *surface);
 
 /* Sets the header's counts of the simplified surface. */
 void ebpo_surface_summarise(const ebpo_surface *surface, ebpo_info *info);

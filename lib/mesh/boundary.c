@@ -195,6 +195,17 @@ static uint32_t next_corner(const chaining *c, uint32_t vertex, uint32_t face)
     return v[0] == vertex ? v[1] : v[1] == vertex ? v[2] : v[0];
 }
 
+/* Returns how many faces use the edge whose run of links begins at `run`, at most 3: very many
+ * faces can share one edge, which all walks around a vertex may meet. */
+static unsigned count_uses(const ebpo_star *star, uint64_t run)
+{
+    unsigned uses = 1;
+    while (uses < 3 && run + uses < star->count &&
+           ebpo_link_neighbour(&star->links[run + uses]) == ebpo_link_neighbour(&star->links[run]))
+        uses++;
+    return uses;
+}
+
 /* Walks around `vertex`, whose faces are in c->star, from the face of an arriving edge across edges
  * that are used twice. Returns the other vertex of the boundary edge that ends the fan, or
  * EBPO_NO_INDEX if the fan ends at another edge. */
@@ -205,7 +216,7 @@ static uint32_t fan_end(const chaining *c, uint32_t vertex, uint32_t face)
         uint64_t run = ebpo_star_find(&c->star, neighbour);
         if (run == c->star.count)
             return EBPO_NO_INDEX;
-        uint64_t uses = ebpo_star_run_end(&c->star, run) - run;
+        unsigned uses = count_uses(&c->star, run);
         if (uses == 1)
             return neighbour;
         const ebpo_link *links = &c->star.links[run];

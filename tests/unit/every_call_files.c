@@ -520,7 +520,7 @@ static ebpo_status call_surface(every_call_env *e)
     uint64_t row[EBPO_PATCH_COLUMNS] = { 1, 0, 1, 1, 3, 3, 0 }, *patches = NULL, count = 0;
     uint8_t code[3] = { 0, 0, 0 }, normal[6] = { 64, 64 }, colour[9] = { 255, 9 };
     uint16_t point[9] = { 0, 0, 0, 200, 0, 0, 0, 200, 0 };
-    ebpo_surface surface = { 1, 1, 3, 3, 3, row, code, point, normal, colour };
+    ebpo_surface surface = { 1, 1, 3, 3, 3, row, code, point, normal, colour, NULL };
     ebpo_patch patch = EBPO_PATCH_INIT;
     ebpo_surface_mesh mesh = { .error = 0 };
     const ebpo_info *info = ebpo_file_info(e->file);

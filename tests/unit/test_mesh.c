@@ -525,6 +525,27 @@ START_TEST(test_high_valence_vertex_is_not_quadratic)
 }
 END_TEST
 
+/* The faces of an edge are not visited again for each of them: 2^39 visits would exceed the time
+ * limit of the test. */
+START_TEST(test_edge_of_many_faces_is_not_quadratic)
+{
+    enum { FACES = 1 << 19 };
+    ebpo_mesh mesh = { .vertex_count = FACES + 2, .face_count = FACES };
+    mesh.xyz64 = calloc(3 * mesh.vertex_count, sizeof *mesh.xyz64);
+    mesh.faces = malloc(3 * mesh.face_count * sizeof *mesh.faces);
+    mesh.xyz64[3] = 1;
+    for (uint32_t i = 0; i < FACES; i++) {
+        memcpy(mesh.faces + 3 * (uint64_t)i, (uint32_t[3]){ 0, 1, i + 2 }, 3 * sizeof *mesh.faces);
+        mesh.xyz64[3 * (uint64_t)(i + 2)] = i;
+        mesh.xyz64[3 * (uint64_t)(i + 2) + 1] = 1;
+    }
+    ebpo_mesh_report r = check(&mesh);
+    ck_assert_uint_eq(r.boundary_edges.count, 2 * (uint64_t)FACES);
+    ck_assert_uint_eq(r.nonmanifold_edges.count, 1);
+    ebpo_mesh_free(&mesh);
+}
+END_TEST
+
 /* ---- real models ---- */
 
 typedef struct model {
@@ -664,6 +685,7 @@ TEST_SUITE(mesh)
     tcase_add_test(repairing, test_fill_balances_random_holes);
     tcase_add_test(repairing, test_fill_counts_open_chains);
     tcase_add_test(repairing, test_high_valence_vertex_is_not_quadratic);
+    tcase_add_test(checking, test_edge_of_many_faces_is_not_quadratic);
     suite_add_tcase(suite, checking);
     suite_add_tcase(suite, repairing);
     if (getenv("EBPO_MODELS")) {

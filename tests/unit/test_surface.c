@@ -468,6 +468,69 @@ START_TEST(test_too_many_triangles)
 }
 END_TEST
 
+/* The work of encoding does not grow with the square of the number of triangles that share an edge:
+ * 2^39 steps would exceed the time limit of the test. */
+START_TEST(test_triangles_that_share_an_edge)
+{
+    enum { COUNT = 1 << 20 };
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_patch_rows rows;
+    ebpo_patch patch;
+    uint32_t *triangle = malloc(COUNT * 3 * sizeof *triangle);
+    uint64_t row[EBPO_PATCH_COLUMNS] = { 1, 0, COUNT, COUNT, COUNT + 2 }, corners = 0;
+    ebpo_patch_source source = {
+        COUNT + 2, COUNT, triangle, calloc(COUNT + 2, 6), calloc(COUNT + 2, 24), NULL
+    };
+    for (uint32_t i = 0; i < COUNT; i++)
+        memcpy(triangle + 3 * (uint64_t)i, (uint32_t[3]){ 0, 1, i + 2 }, 3 * sizeof *triangle);
+    must(ebpo_patch_encode(&source, &rows, &error), "encode", &error);
+    row[EBPO_PATCH_CODE_BYTES] = rows.code_bytes;
+    ebpo_surface s = { 1,           COUNT, COUNT + 2, rows.code_bytes,
+                       0,           row,   rows.code, rows.point,
+                       rows.normal, NULL,  NULL };
+    ebpo_info info = { .box_size = { 1, 1, 1 } };
+    must(ebpo_surface_decode(&s, &info, 0, &patch, &error), "decode", &error);
+    for (uint64_t i = 0; i < 3 * patch.triangle_count; i++)
+        corners += patch.triangles[i] < 2;
+    ck_assert_uint_eq(corners, 2 * (uint64_t)COUNT);
+    ebpo_patch_free(&patch);
+    ebpo_patch_rows_free(&rows);
+    free(triangle);
+    free((void *)source.point);
+    free((void *)source.normal);
+}
+END_TEST
+
+/* Decoding a patch does not read the rows of the patches before, so the time of decoding all
+ * patches is proportional to their number. */
+START_TEST(test_decoding_reads_one_row)
+{
+    ebpo_tree tree;
+    ebpo_surface read;
+    ebpo_file *file;
+    ebpo_error error = EBPO_ERROR_INIT;
+    build(&tree, waves(182, 92), 1);
+    must(ebpo_tree_write(&tree, scratch("rows.ebpo.h5"), NULL, &error), "write", &error);
+    must(ebpo_open(scratch("rows.ebpo.h5"), &file, &error), "open", &error);
+    must(ebpo_file_read_surface(file, 0, EBPO_LEVELS_MAX, &read, &error), "read", &error);
+    for (int i = 0; i < 2; i++) {
+        ebpo_surface *s = i ? &read : &tree.surface;
+        ebpo_patch before, after;
+        uint64_t last = s->patch_count - 1;
+        ck_assert_uint_gt(last, 0);
+        must(ebpo_surface_decode(s, &tree.info, last, &before, &error), "decode", &error);
+        memset(s->patch, 0, last * EBPO_PATCH_COLUMNS * sizeof *s->patch);
+        must(ebpo_surface_decode(s, &tree.info, last, &after, &error), "decode", &error);
+        ck_assert_mem_eq(before.xyz, after.xyz, 3 * before.vertex_count * sizeof *before.xyz);
+        ebpo_patch_free(&before);
+        ebpo_patch_free(&after);
+    }
+    ebpo_surface_free(&read);
+    ebpo_close(file);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 /* Changed codes are refused or decoded to vertices in range. */
 START_TEST(test_hostile_codes)
 {
@@ -789,6 +852,8 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);
     tcase_add_test(tests, test_too_many_triangles);
+    tcase_add_test(tests, test_triangles_that_share_an_edge);
+    tcase_add_test(tests, test_decoding_reads_one_row);
     tcase_add_test(tests, test_hostile_codes);
     tcase_add_test(tests, test_views_are_closed);
     tcase_add_test(tests, test_faces_of_extreme_sizes);

@@ -470,6 +470,9 @@ typedef struct ebpo_surface {
     uint16_t *point; /* [vertex_count][3] coded coordinates */
     uint8_t *normal; /* [vertex_count][2] coded unit normals; 0, 0: computed by readers */
     uint8_t *colour; /* [colour_count][3] red, green and blue; NULL: no colours */
+    /* [patch_count][2] first vertex and first byte of code of each patch; NULL: each call of
+     * ebpo_surface_decode adds up the rows of all patches before */
+    uint64_t *first;
 } ebpo_surface;
 
 /*
