@@ -150,6 +150,14 @@ static void warn_of_repeated_positions(FILE *out, const char *command, const cha
             (unsigned long long)p->repeated.locations[0], p->repeated.count > 1 ? ", ..." : "");
 }
 
+/* Returns the repairs that --repair chose and made, or NULL. */
+static const ebpo_repair_record *find_made(const mesh_input *p)
+{
+    return p->chosen_by_repair && p->repairs_tried && p->repairs.chosen >= 0
+               ? &p->repairs.tries[p->repairs.chosen].record
+               : NULL;
+}
+
 /* Returns the result of dropping repeated faces alone, if this was tried. */
 static const ebpo_repair_try *find_drop_only(const mesh_input *p)
 {
@@ -164,12 +172,18 @@ static const ebpo_repair_try *find_drop_only(const mesh_input *p)
 static void warn_of_repeated(FILE *out, const char *command, const char *path, const mesh_input *p)
 {
     const ebpo_finding *f = &p->prepared.report.repeated_faces;
+    const ebpo_repair_record *made = find_made(p);
     const ebpo_repair_try *t = find_drop_only(p);
     char text[80], steps[64], solid[FINDINGS_VOLUME];
     fprintf(out, "ebpo %s: %s: warning: %s of the same three vertices as an earlier one (face %llu",
             command, path, words_plural(text, sizeof text, f->count, "face is", "faces are"),
             (unsigned long long)f->locations[0]);
     fputs(f->count > 1 ? ", ...): " : "): ", out);
+    if (made) { /* repairs were tried on the mesh before it was repaired */
+        fprintf(out, "%s --drop-duplicates instead of --repair drops such faces, too\n",
+                steps_text(steps, sizeof steps, made));
+        return;
+    }
     if (!t) {
         fprintf(out, "--drop-duplicates drops such faces%s\n",
                 p->repairs_tried ? "" : "; 'ebpo check' without options reports the result");
