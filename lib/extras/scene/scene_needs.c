@@ -447,7 +447,9 @@ static int level_for(const ebpo_info *info, double size)
     return -1;
 }
 
-/* Adds the levels of an instance that the camera can resolve between two times. */
+/* Adds the levels of an instance that the camera can resolve between two times. The least distance
+ * and the greatest stretch may be at different points and times, so the level may be finer than
+ * needed, but not coarser. */
 static ebpo_status add_instance_view(const view_search *s, uint64_t instance, double from,
                                      double to)
 {
