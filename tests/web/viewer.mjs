@@ -939,6 +939,10 @@ async function showsCaps(browser, address, plainPage) {
   await page.waitForFunction(() => /show=caps/.test(location.search));
   await page.goto(page.url());
   assert.equal(await red(), share, 'the link shows the caps');
+  await page.keyboard.press('k');
+  await page.keyboard.press('k');
+  assert.ok(await red() > 0.15, 'caps are red beside faces coloured by type');
+  await page.keyboard.press('k');
   await page.keyboard.press('h');
   assert.equal(await red(), 0, 'without caps');
   await page.close();

@@ -10,7 +10,7 @@ export const LEVEL_COLOURS = ['#3d2c6b', '#473f8c', '#4257a0', '#3a6fa8', '#3387
 const VERTEX = `
   attribute vec4 tag;
   attribute vec2 bend;
-  attribute vec4 hue; // the model's colour, sRGB; the last component is 1 where there is no colour
+  attribute vec4 hue; // a colour, sRGB; the last component is 0 for the model's colours, 0.25 for caps, and 1 where there is no colour
   varying vec3 eyeSpace;
   varying vec3 scenePlace;
   varying vec3 colour;
@@ -36,7 +36,7 @@ const VERTEX = `
     lent = normalMatrix * normalize(n) * (tag.z / 255.0);
     turned = face ? 1.0 : 0.0;
     colour = colouring == 0 ? plain : colouring == 1 ? levels[int(tag.x + 0.5)] : face ? mesh : types[kind];
-    if (own && colouring == 0 && hue.w < 0.5)
+    if (hue.w < 0.2 ? own && colouring == 0 : hue.w < 0.5)
       colour = mix(hue.rgb / 12.92, pow((hue.rgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, hue.rgb)); // linear light
     #ifdef USE_INSTANCING
       if (gl_InstanceID == chosen) colour = mix(colour, accent, 0.55);

@@ -6,7 +6,7 @@ import { LEAF } from './tree.js';
 
 export const KEY = 'surface';      // key of the tile
 export const CAPS = 'caps';        // key of the tile with the caps
-const CAP_COLOUR = [214, 64, 51, 0];
+const CAP_COLOUR = [214, 64, 51, 64]; // its last component shows it in every colouring
 const CELL_PIXELS = 16;            // normal detail
 const ERROR = 2;                   // allowed error in pixels at normal detail; most of a patch is much closer to the model
 const TRIANGLES = 150_000;         // most triangles at this detail; twice as many at half of the pixels, which fast machines draw
