@@ -290,19 +290,41 @@ void ebpo_attributes_close(ebpo_file *file)
     free(file->attributes.head);
 }
 
+/* Describes an array. `different`: its rows are lists of different lengths. */
+static ebpo_attribute_facts facts_of(const ebpo_attribute *a, bool different)
+{
+    ebpo_attribute_facts facts = { .type = a->type,
+                                   .rows = a->rows,
+                                   .columns = different ? 0 : a->columns,
+                                   .list = a->list != EBPO_ATTRIBUTE_NO_LIST };
+    snprintf(facts.element, sizeof facts.element, "%s", a->element);
+    snprintf(facts.names, sizeof facts.names, "%s", a->names);
+    return facts;
+}
+
+bool ebpo_mesh_attribute(const ebpo_mesh *mesh, unsigned n, ebpo_attribute_facts *out,
+                         ebpo_attribute_values *values)
+{
+    if (!mesh->attributes || n >= mesh->attributes->count)
+        return false;
+    const ebpo_attribute *a = &mesh->attributes->array[n];
+    ebpo_attribute_facts facts = facts_of(a, a->ends != NULL);
+    if (EBPO_GIVE(ebpo_attribute_facts, out, &facts) != EBPO_OK)
+        return false;
+    *values = (ebpo_attribute_values){ .values = a->values,
+                                       .ends = a->ends,
+                                       .count = ebpo_attribute_value_count(a) };
+    return true;
+}
+
 bool ebpo_file_attribute(const ebpo_file *file, unsigned n, ebpo_attribute_facts *out)
 {
     if (n >= file->attributes.count)
         return false;
     const ebpo_attribute_in *attribute = &file->attributes.head[n];
-    ebpo_attribute_facts facts = { .type = attribute->head.type,
-                                   .rows = attribute->head.rows,
-                                   .columns = attribute->different ? 0 : attribute->head.columns,
-                                   .list = attribute->head.list != EBPO_ATTRIBUTE_NO_LIST,
-                                   .has_range = attribute->has_range,
-                                   .range = { attribute->range[0], attribute->range[1] } };
-    snprintf(facts.element, sizeof facts.element, "%s", attribute->head.element);
-    snprintf(facts.names, sizeof facts.names, "%s", attribute->head.names);
+    ebpo_attribute_facts facts = facts_of(&attribute->head, attribute->different);
+    facts.has_range = attribute->has_range;
+    memcpy(facts.range, attribute->range, sizeof facts.range);
     for (int i = ebpo_values_number(n); i <= ebpo_items_number(n); i++)
         facts.stored_bytes += ebpo_reader_stored_bytes(file, &file->attributes.array[i]);
     return EBPO_GIVE(ebpo_attribute_facts, out, &facts) == EBPO_OK;

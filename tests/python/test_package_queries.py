@@ -192,6 +192,27 @@ class Queries(Case):
         self.assertLess(cut[2].vertices[:, 2].max(), .1 + 1e-15)
         self.assertEqual(cut[2].volume, cut[3].volume)
         self.assertTrue(np.isnan(mesh.volume).all())
+        self.assertEqual(mesh.attributes, {})
+        mesh = ebpo.boolean("A - B", [m, m], poses=poses, origins=True)
+        origins, faces = (mesh.attributes[f"face:{name}"] for name in ("operand", "operand_face"))
+        source = m.mesh(order="source")
+        self.assertEqual([len(origins), len(faces), set(origins)], [len(mesh.faces)] * 2 + [{0, 1}])
+        low, high = (f(source.vertices[source.faces[faces[origins == 0]]], axis=1) for f in (np.min, np.max))
+        corners = mesh.vertices[mesh.faces[origins == 0]]
+        self.assertTrue((corners >= low[:, None] - 1e-6).all() and (corners <= high[:, None] + 1e-6).all())
+        change = ebpo.boolean("A - B", [m, m], poses=poses, changed_only=True, origins=True)
+        first, count = (change.attributes[f"removed:{name}"] for name in ("first", "count"))
+        removed = np.concatenate([np.arange(a, a + n) for a, n in zip(first, count)])
+        self.assertTrue(0 < len(removed) < m.info.face_count and len(change.faces) < len(mesh.faces))
+        self.assertEqual(len(mesh.faces), len(change.faces) + m.info.face_count - len(removed))
+        with self.assertRaises(ebpo.ArgumentError):
+            ebpo.boolean("A - B", [m, m], poses=poses, changed_only=True, attributes=True)
+        coloured = model("coloured")
+        whole = ebpo.boolean("A", [coloured], attributes=True)
+        red, mesh = coloured.attributes["red"], coloured.mesh()
+        pairs = [set(map(tuple, np.column_stack([v[f.ravel()], r[f.ravel()]])))
+                 for v, f, r in ((mesh.vertices, mesh.faces, red), (whole.vertices, whole.faces, whole.attributes["vertex:red"]))]
+        self.assertEqual(*pairs)
         for wrong in {"box": [1, 2]}, {"planes": [1, 2, 3]}, {"temp_dir": "."}:
             with self.assertRaises(ValueError):
                 ebpo.boolean("A", [m], **wrong)

@@ -17,7 +17,10 @@ ebpo_status every_call_read(every_call_env *e, const char *name, ebpo_mesh *mesh
 static ebpo_status call_read(every_call_env *e)
 {
     ebpo_mesh mesh;
+    ebpo_attribute_facts facts = EBPO_ATTRIBUTE_FACTS_INIT;
+    ebpo_attribute_values values;
     ebpo_status status = every_call_read(e, EVERY_CALL_PLY, &mesh);
+    (void)ebpo_mesh_attribute(&mesh, 0, &facts, &values);
     (void)ebpo_mesh_attributes_lost(&mesh);
     (void)ebpo_mesh_ignored(&mesh);
     (void)ebpo_mesh_has_attributes(&mesh);

@@ -1085,6 +1085,19 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_file_attribute_ends(const ebpo_file *fil
 EBPO_API void ebpo_attribute_values_free(ebpo_attribute_values *values);
 
 /*
+ * Describes the n-th array of attributes of a mesh in memory, and gets its values: of a mesh that
+ * was read with attributes, or of ebpo_boolean_mesh. If the mesh has fewer arrays, returns false
+ * and does not change `facts` and `values`.
+ *
+ * facts   without range and stored_bytes
+ * values  arrays of the mesh, valid until it is changed or freed; do not free them
+ *
+ * Threads: any.
+ */
+EBPO_API bool ebpo_mesh_attribute(const ebpo_mesh *mesh, unsigned n, ebpo_attribute_facts *facts,
+                                  ebpo_attribute_values *values);
+
+/*
  * Reads the whole file. Freed by ebpo_tree_free.
  *
  * EBPO_E_ARGUMENT: `omitted_parts` is not 0.

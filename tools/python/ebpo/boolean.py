@@ -13,7 +13,7 @@ from ._checked import doubles as to_doubles
 from ._checked import path
 from ._library import Handle, Reporter, Struct, call, made, size_in_bytes
 from .collide import pose_of
-from .parts import mesh_of
+from .parts import mesh_attributes, mesh_of
 from .scene import Scene
 from .signatures import ArrayLike, Path, Progress, Size, Uint32s, Vertices
 
@@ -32,12 +32,15 @@ class Result(NamedTuple):
     vertices: (n, 3) float32 or float64. faces: (m, 3) uint32. displacement: greatest distance between a vertex
     and its exact position. volume: bounds of the volume before rounding, equal or neighbouring doubles; nan
     unless requested.
+    attributes: arrays by "element:name", such as "face:operand", "vertex:red" or "removed:first"; empty unless
+    requested.
     """
 
     vertices: Vertices
     faces: Uint32s
     displacement: float
     volume: tuple[float, float]
+    attributes: dict[str, Any]
 
 
 class Parser:
@@ -87,7 +90,8 @@ class Parser:
 
 def boolean(expression: str, models: Sequence[Model | Scene], *, poses: Sequence[Pose | ArrayLike | None] | None = None,
             time: float | None = None, box: ArrayLike | None = None, planes: ArrayLike | None = None,
-            doubles: bool = False, volume: bool = False, memory: Size | None = None, temp_dir: Path | None = None,
+            doubles: bool = False, volume: bool = False, origins: bool = False, attributes: bool = False,
+            changed_only: bool = False, memory: Size | None = None, temp_dir: Path | None = None,
             threads: int | None = None, progress: Progress | None = None) -> Result:
     """Return the mesh of a Boolean expression of models at poses: closed, and cut exactly.
 
@@ -101,6 +105,11 @@ def boolean(expression: str, models: Sequence[Model | Scene], *, poses: Sequence
     doubles: True: float64 coordinates; False: float32 if all models have float32 and are near
         the origin (at most 1,024 times farther than they are long).
     volume: True: compute the volume.
+    origins: True: "face:operand" is the index of the letter from which each face comes, and "face:operand_face"
+        the index of its face in the source.
+    attributes: True: attributes of the models' vertices and faces, interpolated at new vertices.
+    changed_only: True: omit the faces of A that are faces of the result; "removed:first" and "removed:count" are
+        the ranges of the other faces of A, as indices in its file.
     memory: budget in bytes for the process; the rest is stored in temporary files in temp_dir. None: no limit.
     temp_dir: folder for these files, and for the small files of box and planes.
 
@@ -138,11 +147,12 @@ def boolean(expression: str, models: Sequence[Model | Scene], *, poses: Sequence
         workspace = Handle.made("ebpo_workspace_new", ctypes.byref(space), free="ebpo_workspace_free")
     mesh, report = Struct(c.ebpo_mesh, "ebpo_mesh_free", workspace), made(c.ebpo_boolean_mesh_report)
     with Reporter(progress) as reported:
-        how = made(c.ebpo_boolean_mesh_options, doubles=doubles, volume=volume, progress=reported,
+        how = made(c.ebpo_boolean_mesh_options, doubles=doubles, volume=volume, origins=origins, attributes=attributes,
+                   changed_only=changed_only, progress=reported,
                    workspace=workspace.pointer if workspace else None)
         call("ebpo_boolean_mesh", handle, ctypes.byref(how), mesh, ctypes.byref(report))
     bounds = (report.volume.lo, report.volume.hi) if volume else (math.nan, math.nan)
-    return Result(*mesh_of(mesh), report.displacement, bounds)
+    return Result(*mesh_of(mesh), report.displacement, bounds, mesh_attributes(mesh))
 
 
 def operands_of(item: Model | Scene, time: float | None) -> list[tuple[Handle, int, c.ebpo_pose]]:

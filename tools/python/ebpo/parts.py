@@ -243,6 +243,35 @@ def read_surface(file: Handle, observer: Any, **members: Any) -> Surface:
 TYPES = [np.int8, np.uint8, np.int16, np.uint16, np.int32, np.uint32, np.float32, np.float64]
 
 
+def facts_of(facts: Any) -> dict[str, Any]:
+    return {"element": text(facts.element), "names": text(facts.names).split(" "), "dtype": np.dtype(TYPES[facts.type]),
+            "rows": facts.rows, "list": bool(facts.list), "range": tuple(facts.range) if facts.has_range else None}
+
+
+def shaped(owner: Any, values: Any, about: dict[str, Any], column: int) -> Any:
+    """Return a column of an array of attributes, or its rows if they are lists."""
+    flat = array(owner, values.values, (values.count,), about["dtype"])
+    if values.ends:
+        ends = array(owner, values.ends, (about["rows"],), np.uint64)
+        return np.split(flat, ends[:-1].astype(np.int64))
+    if not about["rows"]:
+        return flat
+    rows = flat.reshape(about["rows"], -1)
+    return rows[:, column] if not about["list"] and (len(about["names"]) > 1 or rows.shape[1] == 1) else rows
+
+
+def mesh_attributes(mesh: Struct) -> dict[str, Any]:
+    """Return the attributes of a mesh in memory, by "element:name"."""
+    found: dict[str, Any] = {}
+    number, facts, values = 0, made(c.ebpo_attribute_facts), c.ebpo_attribute_values()
+    while lib.ebpo_mesh_attribute(mesh, number, ctypes.byref(facts), ctypes.byref(values)):
+        about = facts_of(facts)
+        for column, name in enumerate(about["names"]):
+            found[f"{about['element']}:{name}"] = shaped(mesh, values, about, column)
+        number += 1
+    return found
+
+
 class AttributeNameError(KeyError):
     """The file has no attribute of this name. The message lists the attributes."""
 
@@ -293,9 +322,7 @@ class Attributes(Mapping[str, Any]):
         """Return element, names, type, row count and range of the array with an attribute. Reads no values."""
         facts = made(c.ebpo_attribute_facts)
         lib.ebpo_file_attribute(self._file, self._find(name)[0], ctypes.byref(facts))
-        return {"element": text(facts.element), "names": text(facts.names).split(" "),
-                "dtype": np.dtype(TYPES[facts.type]), "rows": facts.rows, "list": bool(facts.list),
-                "range": tuple(facts.range) if facts.has_range else None}
+        return facts_of(facts)
 
     def __getitem__(self, name: str) -> Any:
         number, column = self._find(name)
@@ -303,16 +330,7 @@ class Attributes(Mapping[str, Any]):
         options = made(c.ebpo_read_options, threads=self._threads)
         values = Struct(c.ebpo_attribute_values, "ebpo_attribute_values_free")
         call("ebpo_file_read_attribute", self._file, number, ctypes.byref(options), values)
-        flat = array(values, values.c.values, (values.c.count,), about["dtype"])
-        if values.c.ends:
-            ends = array(values, values.c.ends, (about["rows"],), np.uint64)
-            return np.split(flat, ends[:-1].astype(np.int64))
-        if not about["rows"]:
-            return flat
-        rows = flat.reshape(about["rows"], -1)
-        if about["list"]:
-            return rows
-        return rows[:, column] if len(about["names"]) > 1 or rows.shape[1] == 1 else rows
+        return shaped(values, values.c, about, column)
 
 
 class Subtree:
