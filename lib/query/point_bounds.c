@@ -259,7 +259,8 @@ double ebpo_facing_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t 
             break;
     }
     *facing = b.facing;
-    return b.distance;
+    /* the relative errors of denormal numbers are larger */
+    return b.distance > 0x1p-900 ? b.distance : 0;
 }
 
 /* Shortens [t[0], t[1]] to the part that is not certainly outside the half-space a + b t <= 0. `a`
