@@ -100,11 +100,17 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
 
 /* --- the distance to an envelope, from all half-spaces together ---
  *
- * For unit normals n, values s (ebpo_facing_plane.beyond) and weights w >= 0, the distance is at
- * least sum(w s) / |sum(w n)| (docs/develop/bounds.md, "Points against envelopes"). At most three
- * half-spaces decide. They are found step by step: the half-space that the nearest point so far
- * violates most replaces some of the half-spaces that decided before. So the bound grows with each
- * step, and each step's bound is guaranteed. */
+ * Let n be the unit normals of half-spaces that contain the envelope, s the distances of p from
+ * their planes (ebpo_facing_plane.beyond), and w >= 0 weights with the sum 1. A point x of the
+ * envelope has n . (p - x) >= s for each half-space, so |p - x| >= sum(w s) / |sum(w n)|. At most
+ * three half-spaces decide. They are found step by step: the half-space that the nearest point so
+ * far violates most replaces some of the half-spaces that decided before. So the bound grows with
+ * each step, and each step's bound is guaranteed.
+ *
+ * Rounding, with u = 2^-53: normals are right to 7u (as vectors), and s is right to 6u of its size,
+ * and reduced by 32u of it. sum(w s) loses 4u of sum(w |s|), and is reduced by 32u of it. sum(w n),
+ * whose length is at most 1, loses 7u with its normals and 10u with its computation; its length is
+ * enlarged by 128u, which also covers the quotient. */
 
 typedef struct facing_bound {
     ebpo_facing facing;
