@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "geometry/polytope.h"
+#include "geometry/vec3.h"
 #include "query/point_bounds.h"
 
 /* A node may list a face that is outside its cell, but within 1/256 of the cell's size on each axis
@@ -118,20 +119,8 @@ typedef struct facing_bound {
     double toward[3]; /* unit vector from the nearest point to p; 0 if `facing` is empty */
 } facing_bound;
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 /* Sets b->distance and b->toward from the half-spaces b->facing with these weights. */
-static void weigh(facing_bound *b, const double weight[3])
+static void set_distance(facing_bound *b, const double weight[3])
 {
     double sum = 0, beyond = 0, size = 0;
     memset(b->toward, 0, sizeof b->toward);
@@ -145,7 +134,7 @@ static void weigh(facing_bound *b, const double weight[3])
         for (int k = 0; k < 3; k++)
             b->toward[k] += share * h->normal[k];
     }
-    double length = sqrt(dot(b->toward, b->toward));
+    double length = ebpo_vec3_length(b->toward);
     b->distance = (beyond - size * 0x1p-48) / (length + 0x1p-46);
     for (int k = 0; k < 3; k++)
         b->toward[k] /= length;
@@ -159,18 +148,18 @@ static bool find_weights(const ebpo_facing *f, double weight[3])
     if (f->count == 1) {
         weight[0] = 1;
     } else if (f->count == 2) {
-        double cosine = dot(a->normal, b->normal);
+        double cosine = ebpo_vec3_dot(a->normal, b->normal);
         weight[0] = a->beyond - cosine * b->beyond;
         weight[1] = b->beyond - cosine * a->beyond;
     } else {
         double across[3][3], to[3];
-        cross(b->normal, c->normal, across[0]);
-        cross(c->normal, a->normal, across[1]);
-        cross(a->normal, b->normal, across[2]);
+        ebpo_vec3_cross(b->normal, c->normal, across[0]);
+        ebpo_vec3_cross(c->normal, a->normal, across[1]);
+        ebpo_vec3_cross(a->normal, b->normal, across[2]);
         for (int k = 0; k < 3; k++)
             to[k] = a->beyond * across[0][k] + b->beyond * across[1][k] + c->beyond * across[2][k];
         for (int i = 0; i < 3; i++)
-            weight[i] = dot(to, across[i]);
+            weight[i] = ebpo_vec3_dot(to, across[i]);
     }
     for (int i = 0; i < f->count; i++)
         if (!(weight[i] > 0))
@@ -197,7 +186,7 @@ static bool add_facing_plane(facing_bound *b, const ebpo_facing_plane *added)
         next.facing.count = count;
         if (!find_weights(&next.facing, weight))
             continue;
-        weigh(&next, weight);
+        set_distance(&next, weight);
         if (next.distance > best.distance && isfinite(next.distance))
             best = next;
     }
@@ -255,7 +244,7 @@ double ebpo_facing_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t 
         const ebpo_facing_plane *worst = NULL;
         double most = b.distance * 0x1p-30;
         for (unsigned i = 0; i < seen; i++) {
-            double violation = all[i].beyond - b.distance * dot(all[i].normal, b.toward);
+            double violation = all[i].beyond - b.distance * ebpo_vec3_dot(all[i].normal, b.toward);
             if (violation > most) {
                 most = violation;
                 worst = &all[i];
