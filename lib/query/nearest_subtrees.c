@@ -127,11 +127,12 @@ typedef struct deep_search {
     double upper;
 } deep_search;
 
-typedef struct deep_child {
+typedef struct deep_node {
     uint32_t entry; /* in the table of the deep bounds */
     ebpo_cell cell;
-    double lower; /* lower bound of the distance */
-} deep_child;
+    double lower;       /* lower bound of the distance */
+    ebpo_facing facing; /* half-spaces that contain the node's envelope */
+} deep_node;
 
 /* Returns the planes of the node that has this entry in the table of the deep bounds. */
 static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
@@ -141,20 +142,31 @@ static ebpo_top_planes planes_of(const ebpo_top *t, uint32_t entry)
                                                                 : t->gray[value];
 }
 
-/* Lists the children of a gray node that have bounds below g->best, the nearest first. `parent`:
- * bound of the gray node. Returns their number. */
-static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cell, double parent,
-                              deep_child out[8])
+/* Returns a lower bound of the distance to a node, at least `parent`. *facing: half-spaces that
+ * contain the parent's envelope, then the node's (ebpo_facing_distance). Far points do not use
+ * them. */
+static double rank_facing(const ebpo_ranking *r, const ebpo_top *top, uint32_t entry,
+                          ebpo_cell cell, double parent, double enough, ebpo_facing *facing)
+{
+    ebpo_top_planes planes = planes_of(top, entry);
+    const uint32_t *codes = top->planes + planes.first;
+    return fmax(parent, r->far ? ebpo_rank_cell(r, cell, codes, planes.count, enough)
+                               : ebpo_facing_distance(&r->box, cell, codes, planes.count, r->p,
+                                                      enough, facing));
+}
+
+/* Lists the children of a gray node that have bounds below g->best, the nearest first. Returns
+ * their number. */
+static int rank_deep_children(const deep_search *g, const deep_node *gray, deep_node out[8])
 {
     int count = 0;
     for (unsigned octant = 0; octant < 8; octant++) {
-        deep_child c = { ebpo_table_child(&g->top->nodes, gray, octant),
-                         ebpo_cell_child(cell, octant), 0 };
+        deep_node c = *gray;
+        c.entry = ebpo_table_child(&g->top->nodes, gray->entry, octant);
+        c.cell = ebpo_cell_child(gray->cell, octant);
         if (ebpo_entry_kind_of(c.entry) == EBPO_ENTRY_UNIFORM)
             continue;
-        ebpo_top_planes planes = planes_of(g->top, c.entry);
-        c.lower = fmax(parent, ebpo_rank_cell(g->ranking, c.cell, g->top->planes + planes.first,
-                                              planes.count, g->best));
+        c.lower = rank_facing(g->ranking, g->top, c.entry, c.cell, gray->lower, g->best, &c.facing);
         if (c.lower >= g->best)
             continue;
         int at = count++;
@@ -166,42 +178,50 @@ static int rank_deep_children(const deep_search *g, uint32_t gray, ebpo_cell cel
 }
 
 /* Lowers g->best to the least bound of a deepest node below a gray node. */
-static void search_deep(deep_search *g, uint32_t gray, ebpo_cell cell, double parent)
+static void search_deep(deep_search *g, const deep_node *gray)
 {
-    deep_child child[8];
-    int count = rank_deep_children(g, gray, cell, parent, child);
+    deep_node child[8];
+    int count = rank_deep_children(g, gray, child);
     for (int i = 0; i < count && child[i].lower < g->best; i++)
         if (ebpo_entry_kind_of(child[i].entry) == EBPO_ENTRY_GRAY) {
             g->upper = fmin(g->upper, ebpo_rank_cell_end(g->ranking, child[i].cell));
-            search_deep(g, child[i].entry, child[i].cell, child[i].lower);
+            search_deep(g, &child[i]);
         } else {
             g->best = child[i].lower;
         }
 }
 
-/* Returns a guaranteed lower bound of the distance to the faces in the cell of a node of the cut
- * level, from deep bounds. `lower`: a known lower bound; the result is at least this bound. Once a
- * bound is beyond `limit`, no better bound is searched for. *upper: is lowered to an upper bound of
- * the distance to the model's nearest face, if one is found; NULL is allowed. (For a far point, all
- * bounds are keys.) Any thread may call this function. */
+/* Returns a guaranteed lower bound of the distance to the faces in the cell of a subtree's root,
+ * from the envelopes of the nodes above it and from deep bounds. `lower`: a known lower bound; the
+ * result is at least this bound. Once a bound is beyond `limit`, no better bound is searched for.
+ * *upper: is lowered to an upper bound of the distance to the model's nearest face, if one is
+ * found; NULL is allowed. (For a far point, all bounds are keys.) Any thread may call this
+ * function. */
 static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
                               double limit, double *upper)
 {
     const ebpo_model *m = ranking->model;
-    const ebpo_top *top = atomic_load_explicit(&m->deep, memory_order_acquire);
-    int level = node->cell.level;
-    if (!top || !m->skeletons || node->type != EBPO_GRAY)
-        return lower;
-    ebpo_descent d = ebpo_descent_begin(&top->nodes, level, node->cell.at);
-    while (d.level < level && ebpo_descent_step(&d, &top->nodes, level, node->cell.at))
-        ;
-    if (d.level < level || ebpo_entry_kind_of(d.entry) != EBPO_ENTRY_GRAY)
-        return lower;
+    const ebpo_top *top =
+        m->skeletons ? atomic_load_explicit(&m->deep, memory_order_acquire) : NULL;
+    top = top ? top : m->top;
+    deep_node at = { .entry = top->nodes.root, .lower = lower };
+    for (;;) {
+        at.lower = rank_facing(ranking, top, at.entry, at.cell, at.lower, limit, &at.facing);
+        if (at.lower > limit)
+            return at.lower;
+        if (at.cell.level == node->cell.level)
+            break;
+        unsigned octant = ebpo_cell_octant(node->cell, at.cell.level);
+        at.entry = ebpo_table_child(&top->nodes, at.entry, octant);
+        at.cell = ebpo_cell_child(at.cell, octant);
+    }
+    if (ebpo_entry_kind_of(at.entry) != EBPO_ENTRY_GRAY)
+        return at.lower;
     deep_search g = { top, ranking, nextafter(limit, INFINITY), INFINITY };
-    search_deep(&g, d.entry, node->cell, lower);
+    search_deep(&g, &at);
     if (upper)
         *upper = fmin(*upper, g.upper);
-    return fmax(lower, g.best);
+    return fmax(at.lower, g.best);
 }
 
 /* --- the search --- */

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "geometry/polytope.h"
+#include "geometry/vec3.h"
 #include "query/point_bounds.h"
 
 /* A node may list a face that is outside its cell, but within 1/256 of the cell's size on each axis
@@ -96,6 +97,165 @@ double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_
             best = distance;
     }
     return isnan(best) ? 0 : best;
+}
+
+/* --- the distance to an envelope, from all half-spaces together ---
+ *
+ * Let n be the unit normals of half-spaces that contain the envelope, s the distances of p from
+ * their planes (ebpo_facing_plane.beyond), and w >= 0 weights with the sum 1. A point x of the
+ * envelope has n . (p - x) >= s for each half-space, so |p - x| >= sum(w s) / |sum(w n)|. At most
+ * three half-spaces decide. They are found step by step: the half-space that the nearest point so
+ * far violates most replaces some of the half-spaces that decided before. So the bound grows with
+ * each step, and each step's bound is guaranteed.
+ *
+ * Rounding, with u = 2^-53: normals are right to 7u (as vectors), and s is right to 6u of its size,
+ * and reduced by 32u of it. sum(w s) loses 4u of sum(w |s|), and is reduced by 32u of it. sum(w n),
+ * whose length is at most 1, loses 7u with its normals and 10u with its computation; its length is
+ * enlarged by 128u, which also covers the quotient. */
+
+typedef struct facing_bound {
+    ebpo_facing facing;
+    double distance;
+    double toward[3]; /* unit vector from the nearest point to p; 0 if `facing` is empty */
+} facing_bound;
+
+/* Sets b->distance and b->toward from the half-spaces b->facing with these weights. */
+static void set_distance(facing_bound *b, const double weight[3])
+{
+    double sum = 0, beyond = 0, size = 0;
+    memset(b->toward, 0, sizeof b->toward);
+    for (int i = 0; i < b->facing.count; i++)
+        sum += weight[i];
+    for (int i = 0; i < b->facing.count; i++) {
+        const ebpo_facing_plane *h = &b->facing.at[i];
+        double share = weight[i] / sum;
+        beyond += share * h->beyond;
+        size += share * fabs(h->beyond);
+        for (int k = 0; k < 3; k++)
+            b->toward[k] += share * h->normal[k];
+    }
+    double length = ebpo_vec3_length(b->toward);
+    b->distance = (beyond - size * 0x1p-48) / (length + 0x1p-46);
+    for (int k = 0; k < 3; k++)
+        b->toward[k] /= length;
+}
+
+/* Computes the weights of the point on the planes of all half-spaces that is nearest to p. Returns
+ * false if a weight is not positive. Then fewer half-spaces decide. */
+static bool find_weights(const ebpo_facing *f, double weight[3])
+{
+    const ebpo_facing_plane *a = &f->at[0], *b = &f->at[1], *c = &f->at[2];
+    if (f->count == 1) {
+        weight[0] = 1;
+    } else if (f->count == 2) {
+        double cosine = ebpo_vec3_dot(a->normal, b->normal);
+        weight[0] = a->beyond - cosine * b->beyond;
+        weight[1] = b->beyond - cosine * a->beyond;
+    } else {
+        double across[3][3], to[3];
+        ebpo_vec3_cross(b->normal, c->normal, across[0]);
+        ebpo_vec3_cross(c->normal, a->normal, across[1]);
+        ebpo_vec3_cross(a->normal, b->normal, across[2]);
+        for (int k = 0; k < 3; k++)
+            to[k] = a->beyond * across[0][k] + b->beyond * across[1][k] + c->beyond * across[2][k];
+        for (int i = 0; i < 3; i++)
+            weight[i] = ebpo_vec3_dot(to, across[i]);
+    }
+    for (int i = 0; i < f->count; i++)
+        if (!(weight[i] > 0))
+            return false;
+    return true;
+}
+
+/* Replaces *b by the greatest bound from `added` and at most two of the half-spaces of *b. Returns
+ * false if no bound is greater than that of *b. */
+static bool add_facing_plane(facing_bound *b, const ebpo_facing_plane *added)
+{
+    facing_bound best = *b;
+    const ebpo_facing *before = &b->facing;
+    for (unsigned kept = 0; kept < 1u << before->count; kept++) {
+        facing_bound next = { .distance = 0 };
+        double weight[3];
+        int count = 0;
+        if (kept == 7)
+            continue;
+        for (int i = 0; i < before->count; i++)
+            if (kept >> i & 1)
+                next.facing.at[count++] = before->at[i];
+        next.facing.at[count++] = *added;
+        next.facing.count = count;
+        if (!find_weights(&next.facing, weight))
+            continue;
+        set_distance(&next, weight);
+        if (next.distance > best.distance && isfinite(next.distance))
+            best = next;
+    }
+    bool greater = best.distance > b->distance;
+    *b = best;
+    return greater;
+}
+
+/* Sets *out to the half-space of a plane code. Returns false if the code is invalid, or if
+ * coordinates overflow. `xi`: p in cell coordinates. */
+static bool see_plane(const double size[3], const double xi[3], uint32_t code,
+                      ebpo_facing_plane *out)
+{
+    int32_t n[3] = { 0, 0, 0 };
+    double error, value = plane_value(xi, code, n, &error);
+    double gradient[3] = { 4096.0 * n[0] / size[0], 4096.0 * n[1] / size[1],
+                           4096.0 * n[2] / size[2] };
+    double length = safe_length(gradient), beyond = (value - error) / length;
+    for (int k = 0; k < 3; k++)
+        out->normal[k] = gradient[k] / length;
+    out->beyond = beyond - fabs(beyond) * 0x1p-48;
+    return length > 0 && isfinite(length) && isfinite(out->beyond);
+}
+
+/* Lists the half-spaces of the cell and of its planes. Returns their number. */
+static unsigned see_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
+                           uint32_t count, const double p[3], ebpo_facing_plane out[])
+{
+    double low[3], size[3], xi[3];
+    unsigned seen = 0;
+    cell_size(box, cell, low, size);
+    for (int k = 0; k < 3; k++) {
+        double above = p[k] - (low[k] + size[k]), below = low[k] - p[k];
+        xi[k] = (p[k] - low[k]) / size[k];
+        out[seen] = (ebpo_facing_plane){ { 0, 0, 0 }, above - fabs(above) * 0x1p-48 };
+        out[seen++].normal[k] = 1;
+        out[seen] = (ebpo_facing_plane){ { 0, 0, 0 }, below - fabs(below) * 0x1p-48 };
+        out[seen++].normal[k] = -1;
+    }
+    for (uint32_t i = 0; i < count && i < EBPO_NODE_PLANES; i++)
+        seen += see_plane(size, xi, codes[i], &out[seen]);
+    return seen;
+}
+
+double ebpo_facing_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
+                            uint32_t count, const double p[3], double enough, ebpo_facing *facing)
+{
+    enum { STEPS = 16 }; /* nearly all envelopes need at most five */
+    ebpo_facing_plane all[6 + EBPO_NODE_PLANES + 3];
+    facing_bound b = { .facing = { .count = 0 } };
+    unsigned seen = see_planes(box, cell, codes, count, p, all);
+    for (int i = 0; i < facing->count; i++)
+        all[seen++] = facing->at[i];
+    for (int step = 0; step < STEPS && !(b.distance > enough); step++) {
+        const ebpo_facing_plane *worst = NULL;
+        double most = b.distance * 0x1p-30;
+        for (unsigned i = 0; i < seen; i++) {
+            double violation = all[i].beyond - b.distance * ebpo_vec3_dot(all[i].normal, b.toward);
+            if (violation > most) {
+                most = violation;
+                worst = &all[i];
+            }
+        }
+        if (!worst || !add_facing_plane(&b, worst))
+            break;
+    }
+    *facing = b.facing;
+    /* the relative errors of denormal numbers are larger */
+    return b.distance > 0x1p-900 ? b.distance : 0;
 }
 
 /* Shortens [t[0], t[1]] to the part that is not certainly outside the half-space a + b t <= 0. `a`

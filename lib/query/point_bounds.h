@@ -19,6 +19,25 @@ bool ebpo_outside_planes(const ebpo_box *box, ebpo_cell cell, const uint32_t *co
  * (`count` plane codes). Once a bound is beyond `enough`, no better bound is searched for. */
 double ebpo_envelope_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
                               uint32_t count, const double p[3], double enough);
+
+/* A half-space, seen from a point p. normal: unit vector, out of the half-space. beyond: distance
+ * of p from the half-space's plane, rounded down; negative if p is inside. */
+typedef struct ebpo_facing_plane {
+    double normal[3], beyond;
+} ebpo_facing_plane;
+/* The half-spaces of an envelope that decide its distance from p: the nearest point of the envelope
+ * is on their planes. */
+typedef struct ebpo_facing {
+    int count;
+    ebpo_facing_plane at[3];
+} ebpo_facing;
+/* Returns a lower bound of the same distance as ebpo_envelope_distance, but from all half-spaces
+ * together, so the bound is nearly the distance. Also uses *facing, half-spaces that contain the
+ * envelope of the parent (count 0: none are known). Replaces *facing by the half-spaces that decide
+ * the bound, which contain the envelopes of all children. */
+double ebpo_facing_distance(const ebpo_box *box, ebpo_cell cell, const uint32_t *codes,
+                            uint32_t count, const double p[3], double enough, ebpo_facing *facing);
+
 /* Returns false if the points origin + t direction with `begin` <= t <= `end` are certainly not in
  * the part of the cell in all half-spaces (`count` plane codes). 0 <= `begin`. The points must be
  * in the cell, except for rounding. */

@@ -77,7 +77,7 @@ static void mark_subtree(walk *w, ebpo_cell cell)
 
 /* Returns true if a node that is not farther than the limit has a leaf or a node of the deepest
  * known level that is not farther. Counts the subtrees of which this is true. */
-static bool is_near(walk *w, uint32_t entry, ebpo_cell cell)
+static bool is_near(walk *w, uint32_t entry, ebpo_cell cell, ebpo_facing facing)
 {
     ebpo_entry_kind kind = ebpo_entry_kind_of(entry);
     if (kind == EBPO_ENTRY_UNIFORM)
@@ -85,12 +85,13 @@ static bool is_near(walk *w, uint32_t entry, ebpo_cell cell)
     uint32_t value = ebpo_entry_value(entry);
     ebpo_top_planes p =
         kind == EBPO_ENTRY_SUBTREE_ROOT ? w->top->below_planes[value] : w->top->gray[value];
-    if (ebpo_rank_cell(&w->ranking, cell, w->top->planes + p.first, p.count, INFINITY) > w->limit)
+    if (ebpo_facing_distance(&w->ranking.box, cell, w->top->planes + p.first, p.count, w->ranking.p,
+                             INFINITY, &facing) > w->limit)
         return false;
     bool near = kind != EBPO_ENTRY_GRAY;
     for (unsigned octant = 0; octant < 8 && kind == EBPO_ENTRY_GRAY; octant++)
         near |= is_near(w, ebpo_table_child(&w->top->nodes, entry, octant),
-                        ebpo_cell_child(cell, octant));
+                        ebpo_cell_child(cell, octant), facing);
     if (near &&
         (cell.level == w->cut_level || (cell.level < w->cut_level && kind != EBPO_ENTRY_GRAY))) {
         w->near++;
@@ -164,7 +165,7 @@ int main(int argc, char **argv)
         for (uint64_t i = 0; i < count; i++) {
             w.ranking = ebpo_ranking_of(m, points + 3 * i, NULL);
             w.limit = distance[i];
-            is_near(&w, top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } });
+            is_near(&w, top->nodes.root, (ebpo_cell){ 0, { 0, 0, 0 } }, (ebpo_facing){ 0 });
         }
         printf("level %d: %.2f subtrees, different: %.2f\n", level, (double)w.near / (double)count,
                (double)w.different / (double)count);

@@ -5,11 +5,12 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "query/accel_parts.h"
 #include "check_main.h"
-#include "query/query_model.h"
+#include "query/query_node.h"
 #include "query_support.h"
 
 /* --- bounds --- */
@@ -294,6 +295,91 @@ START_TEST(test_bounds_kernels_agree)
 }
 END_TEST
 
+/* --- envelopes --- */
+
+/* Returns true if the bound exceeds the distance of p and v. */
+static bool exceeds_distance(double bound, const double p[3], const double v[3])
+{
+    mpq_t square, sum, x, y;
+    mpq_inits(square, sum, x, y, NULL);
+    mpq_set_d(square, bound);
+    mpq_mul(square, square, square);
+    for (int k = 0; k < 3; k++) {
+        mpq_set_d(x, p[k]);
+        mpq_set_d(y, v[k]);
+        mpq_sub(x, x, y);
+        mpq_mul(x, x, x);
+        mpq_add(sum, sum, x);
+    }
+    bool exceeds = mpq_cmp(square, sum) > 0;
+    mpq_clears(square, sum, x, y, NULL);
+    return exceeds;
+}
+
+/* Returns the child of a gray node whose cell has the point v. */
+static ebpo_node child_with(const query_model *m, const ebpo_node *gray, const double v[3])
+{
+    ebpo_box box = ebpo_model_box(m->model);
+    unsigned octant = 0;
+    for (int k = 0; k < 3; k++)
+        if (v[k] >= ebpo_cell_face(&box, k, gray->cell.level + 1, 2 * gray->cell.at[k] + 1))
+            octant |= 1u << k;
+    return ebpo_model_child(m->model, gray, octant);
+}
+
+/* The sums of the bounds of all nodes with a vertex: from single half-spaces, and from all. */
+typedef struct bound_sums {
+    double single, all;
+} bound_sums;
+
+/* Checks the bounds of the nodes with the vertex v: no bound exceeds the distance of p and v. */
+static void check_envelopes(const query_model *m, const double p[3], const double v[3],
+                            bound_sums *sums)
+{
+    ebpo_box box = ebpo_model_box(m->model);
+    ebpo_facing facing = { .count = 0 };
+    ebpo_node node = ebpo_model_root(m->model);
+    for (;;) {
+        uint32_t count;
+        const uint32_t *codes = ebpo_model_planes(m->model, &node, &count);
+        double single = ebpo_envelope_distance(&box, node.cell, codes, count, p, INFINITY),
+               all = ebpo_facing_distance(&box, node.cell, codes, count, p, INFINITY, &facing);
+        ck_assert(facing.count >= 0 && facing.count <= 3);
+        ck_assert(!exceeds_distance(all, p, v));
+        sums->single += single / m->size;
+        sums->all += all / m->size;
+        if (node.type != EBPO_GRAY)
+            return;
+        node = child_with(m, &node, v);
+    }
+}
+
+START_TEST(test_envelope_bounds_hold_exactly)
+{
+    query_model m;
+    bound_sums sums = { 0, 0 };
+    query_model_make(&m, query_solid_name(_i), query_solid_make(_i),
+                     &query_variants[_i % query_variant_count]);
+    uint64_t state = (uint64_t)_i, count = query_scaled(200);
+    double *points = query_alloc(count, 3 * sizeof *points), v[3];
+    query_make_points(&m, count, (uint64_t)_i, points);
+    for (uint64_t i = 0; i < count; i++) {
+        bound_sums any = { 0, 0 };
+        double p[3], away = m.size * exp2(-12 * ebpo_test_random_unit(&state));
+        ebpo_test_point(&m.mesh, (uint32_t)(ebpo_test_random(&state) % m.mesh.vertex_count), v);
+        check_envelopes(&m, points + 3 * i, v, &any);
+        for (int k = 0; k < 3; k++)
+            p[k] = v[k] + away * (2 * ebpo_test_random_unit(&state) - 1);
+        check_envelopes(&m, p, v, &sums);
+    }
+    /* the code gives no bounds for distances below 2^-900 */
+    if (m.size > 0x1p-800)
+        ck_assert_msg(sums.all >= sums.single * (1 - 1e-9), "%g, %g", sums.all, sums.single);
+    free(points);
+    query_model_free(&m);
+}
+END_TEST
+
 TEST_SUITE(bounds)
 {
     Suite *suite = suite_create("bounds");
@@ -301,6 +387,7 @@ TEST_SUITE(bounds)
     tcase_set_timeout(bounds, 600);
     tcase_add_loop_test(bounds, test_boxes_and_cylinders_contain_faces, 0, query_solid_count());
     tcase_add_loop_test(bounds, test_block_bounds_same_on_any_cpu, 0, query_solid_count());
+    tcase_add_loop_test(bounds, test_envelope_bounds_hold_exactly, 0, query_solid_count());
     tcase_add_loop_test(bounds, test_bounds_kernels_agree, 0, query_solid_count());
     suite_add_tcase(suite, bounds);
     return suite;

@@ -299,6 +299,46 @@ START_TEST(test_levels_below_cut_bound_unvisited)
 }
 END_TEST
 
+/* Returns the number of subtrees that a query searches in a new model. */
+static uint64_t searched_in_new(const query_model *m, const double p[3], bool deep)
+{
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_distance_result whole, parts;
+    ebpo_model *model;
+    ebpo_context *context;
+    how.cut_level = 3;
+    ASSERT_OK(ebpo_model_new(m->file, &how, &model, error));
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    if (deep)
+        ASSERT_OK(ebpo_deep_bounds_make(model, 2, error));
+    ASSERT_OK(ebpo_distance(context, p, NULL, &parts, error));
+    ASSERT_OK(ebpo_distance(m->context, p, NULL, &whole, error));
+    ck_assert_mem_eq(&parts, &whole, sizeof parts);
+    uint64_t searched = context->searched;
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    return searched;
+}
+
+/* All half-spaces of an envelope together bound its distance, without or with deep bounds. */
+START_TEST(test_envelopes_bound_unvisited)
+{
+    query_model m;
+    uint64_t state = 5, searched = 0;
+    query_model_make(&m, "torus", query_solid_by_name("torus"), &query_variants[2]);
+    for (int i = 0; i < 100; i++) {
+        double p[3];
+        for (int k = 0; k < 3; k++)
+            p[k] = m.info.box_origin[k] + m.info.box_size[k] * ebpo_test_random_unit(&state);
+        searched += searched_in_new(&m, p, _i);
+    }
+    /* 606 and 527; without the half-spaces of the nodes above 745 and 666, and with one half-space
+     * at a time 887 and 785 */
+    ck_assert_msg(searched < (_i ? 580 : 660), "%d", (int)searched);
+    query_model_free(&m);
+}
+END_TEST
+
 /* Levels below the cut are read when queries visit many new subtrees, and not when queries visit
  * few. */
 START_TEST(test_levels_below_cut_load_on_demand)
@@ -461,6 +501,7 @@ TEST_SUITE(skeleton)
     tcase_add_loop_test(tests, test_results_do_not_depend_on_skeletons, 0, 2 * query_solid_count());
     tcase_add_test(tests, test_skeleton_avoids_subtree_searches);
     tcase_add_test(tests, test_levels_below_cut_bound_unvisited);
+    tcase_add_loop_test(tests, test_envelopes_bound_unvisited, 0, 2);
     tcase_add_test(tests, test_levels_below_cut_load_on_demand);
     tcase_add_test(tests, test_skeleton_limits_radius_search);
     tcase_add_test(tests, test_skeleton_memory_limit_is_kept);
