@@ -5,7 +5,12 @@
  * off, the received bytes are kept, and the next attempt requests the missing bytes, after a pause
  * that grows with each attempt. At most five redirects are followed, never from https to http, and
  * the caller's credentials are not sent to another server. The lock belongs to the caller
- * (http_transfer.h). */
+ * (http_transfer.h).
+ *
+ * Small requests share one attempt, which asks for several ranges (`Range: bytes=0-9,50-59`). Some
+ * servers, such as object stores, send the whole file instead. Therefore the first such attempt is
+ * made only when many requests wait. After any other response than the requested parts, or wrong
+ * parts, each range is requested alone, also all later ones. */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -115,13 +120,20 @@ static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, cons
 
 enum { EBPO_SLOTS_MAX = 32 };
 
+enum {
+    JOINED_MAX = 64,           /* most requests that share an attempt */
+    JOINED_BYTES = 128 << 10,  /* most bytes of these requests */
+    JOINED_FIRST = 16,         /* requests that wait before the first shared attempt */
+    PART_OVERHEAD_BYTES = 1024 /* most bytes between two parts, on average */
+};
+
 typedef struct ebpo_transfers ebpo_transfers;
 
 /* A slot for running requests, with a reusable handle. */
 typedef struct ebpo_slot {
     ebpo_transfers *owner;
     CURL *easy;
-    ebpo_request *request;    /* NULL: free */
+    ebpo_request *request;    /* NULL: free; else the first of a list, by offset */
     ebpo_http_version pinned; /* the required version, copied for this attempt */
     bool is_pinned;
     ebpo_http_response response;
@@ -136,7 +148,11 @@ typedef struct ebpo_slot {
     char why[EBPO_WHY_BYTES];
     uint64_t begin, end;                /* range of this attempt */
     uint64_t received, taken, unwanted; /* bytes of the body: all, accepted, ignored */
-    char trouble[CURL_ERROR_SIZE];      /* libcurl's error message */
+    /* of several ranges: the head of the current part, its request, and its missing bytes */
+    ebpo_part_head head;
+    ebpo_request *part;
+    uint64_t part_left, between;   /* between: bytes that are not part of a range */
+    char trouble[CURL_ERROR_SIZE]; /* libcurl's error message */
 } ebpo_slot;
 
 struct ebpo_transfers {
@@ -155,6 +171,12 @@ struct ebpo_transfers {
     ebpo_request *queue; /* urgent requests first */
     ebpo_http_version pinned;
     bool is_pinned;
+    enum {
+        JOINING_UNTRIED, /* no attempt was for several ranges */
+        JOINING_TRIED,   /* no response yet */
+        JOINING_WORKS,
+        JOINING_FAILS /* each attempt is for one range */
+    } joining;
     ebpo_http_stats stats;
     uint64_t random; /* state of random numbers, used only by the thread */
 };
@@ -216,9 +238,12 @@ static size_t receive_header(char *line, size_t size, size_t count, void *user)
 /* Judges the response by its head. Further calls for the same attempt do nothing. */
 static void judge_slot(ebpo_slot *s)
 {
-    ebpo_http_request http_request = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
+    ebpo_http_request http_request = { s->begin,
+                                       s->end,
+                                       s->is_pinned ? &s->pinned : NULL,
                                        s->owner->options->whole_limit,
-                                       s->owner->options->unversioned };
+                                       s->owner->options->unversioned,
+                                       s->request->next != NULL };
     if (!s->has_verdict)
         s->verdict = ebpo_http_response_judge(&s->response, &http_request, &s->status, s->why);
     s->has_verdict = true;
@@ -245,6 +270,50 @@ static size_t receive_part(ebpo_slot *s, const char *bytes, size_t size)
             "the way is broken");
     memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
     s->taken += size;
+    return size;
+}
+
+/* Begins the part whose head is complete. Returns false if no request is waiting for this part. */
+static bool begin_part(ebpo_slot *s)
+{
+    const ebpo_http_response *head = &s->head.response;
+    ebpo_status status;
+    char why[EBPO_WHY_BYTES];
+    ebpo_request *r = s->request;
+    while (r && (r->offset != head->begin || r->got))
+        r = r->next;
+    if (!r)
+        return false;
+    ebpo_http_request wanted = { .begin = r->offset,
+                                 .end = r->offset + r->size,
+                                 .pinned = &s->pinned,
+                                 .unversioned = s->owner->options->unversioned };
+    s->part = r;
+    s->part_left = head->last - head->begin + 1;
+    return ebpo_http_response_judge(head, &wanted, &status, why) == EBPO_HTTP_PART;
+}
+
+/* Stores bytes of several ranges. Returns `size`, or 0 if the body has other parts. */
+static size_t receive_parts(ebpo_slot *s, const char *bytes, size_t size)
+{
+    for (size_t at = 0, step; at < size; at += step) {
+        bool complete = false;
+        step = size - at < s->part_left ? size - at : (size_t)s->part_left;
+        if (step) {
+            memcpy(s->part->data + s->part->got, bytes + at, step);
+            s->part->got += step;
+            s->part_left -= step;
+            continue;
+        }
+        step = ebpo_part_head_take(&s->head, &s->response, bytes + at, size - at, &complete);
+        s->between += step;
+        s->stopped = step == 0 || s->between > (JOINED_MAX + 1) * PART_OVERHEAD_BYTES ||
+                     (complete && !begin_part(s));
+        if (s->stopped) {
+            s->verdict = EBPO_HTTP_SINGLY;
+            return 0;
+        }
+    }
     return size;
 }
 
@@ -277,8 +346,11 @@ static size_t receive_body(char *bytes, size_t size, size_t count, void *user)
         return receive_part(s, bytes, size);
     if (s->verdict == EBPO_HTTP_WHOLE)
         return receive_whole(s, bytes, size);
+    if (s->verdict == EBPO_HTTP_PARTS)
+        return receive_parts(s, bytes, size);
     s->unwanted += size;
-    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_HTTP_REFUSED;
+    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_HTTP_REFUSED ||
+                 s->verdict == EBPO_HTTP_SINGLY;
     return s->stopped ? 0 : size;
 }
 
@@ -485,6 +557,8 @@ void ebpo_transfers_pin(ebpo_transfers *t, const ebpo_http_version *version)
     t->is_pinned = true;
 }
 
+bool ebpo_transfers_join(const ebpo_transfers *t) { return t->joining == JOINING_WORKS; }
+
 void ebpo_transfers_add_stats(const ebpo_transfers *t, ebpo_http_stats *stats)
 {
     stats->requests += t->stats.requests;
@@ -522,11 +596,48 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
     return *by_server ? (double)retry_after : pause;
 }
 
-/* Prepares a slot for the next attempt of a request. The attempt requests only the bytes that are
- * still missing. */
+/* Returns true if a request may share an attempt with others. After a failure, it may not. */
+static bool can_join(const ebpo_transfers *t, const ebpo_request *r, double now)
+{
+    return t->joining != JOINING_FAILS && t->is_pinned && r->size < JOINED_BYTES && !r->failures &&
+           !r->got && r->due <= now;
+}
+
+/* The caller holds the lock. Moves requests from the queue to the attempt of the request r. Their
+ * offsets ascend, as some servers demand. */
+static void join_requests(ebpo_transfers *t, ebpo_request *r, double now)
+{
+    ebpo_request *last = r;
+    uint64_t bytes = r->size, waiting = 1;
+    r->next = NULL;
+    for (const ebpo_request *q = t->queue; q && t->joining == JOINING_UNTRIED; q = q->next)
+        waiting += can_join(t, q, now);
+    if (!can_join(t, r, now) || (t->joining == JOINING_UNTRIED && waiting < JOINED_FIRST))
+        return;
+    unsigned count = 1;
+    for (ebpo_request **at = &t->queue; *at && count < JOINED_MAX;) {
+        ebpo_request *q = *at;
+        if (!can_join(t, q, now) || q->offset < last->offset + last->size ||
+            bytes + q->size > JOINED_BYTES) {
+            at = &q->next;
+            continue;
+        }
+        *at = q->next;
+        q->next = NULL;
+        last = last->next = q;
+        bytes += q->size;
+        count++;
+    }
+    if (count > 1 && t->joining == JOINING_UNTRIED)
+        t->joining = JOINING_TRIED;
+}
+
+/* Prepares a slot for the next attempt of a request, or of a list of requests. The attempt requests
+ * only the bytes that are still missing. */
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
-    char range[64];
+    char range[JOINED_MAX * 42];
+    int length = 0;
     bool has_version = r->first && r->got > 0;
     s->request = r;
     s->is_pinned = t->is_pinned || has_version;
@@ -537,11 +648,18 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     s->why[0] = s->trouble[0] = 0;
     s->begin = r->offset + (r->whole ? 0 : r->got);
     s->end = r->offset + r->size;
-    s->received = s->taken = s->unwanted = 0;
-    if (r->deadline <= 0)
-        r->deadline = now + t->options->time_limit;
-    double remaining_ms = (r->deadline - now) * 1000;
-    snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
+    s->received = s->taken = s->unwanted = s->part_left = s->between = 0;
+    s->head = (ebpo_part_head){ .in_head = false };
+    double deadline = now + t->options->time_limit;
+    for (ebpo_request *q = r; q; q = q->next) {
+        if (q->deadline <= 0)
+            q->deadline = now + t->options->time_limit;
+        deadline = q->deadline < deadline ? q->deadline : deadline;
+        length +=
+            snprintf(range + length, sizeof range - (size_t)length, "%s%" PRIu64 "-%" PRIu64,
+                     q == r ? "" : ",", q == r ? s->begin : q->offset, q->offset + q->size - 1);
+    }
+    double remaining_ms = (deadline - now) * 1000;
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
     if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
@@ -675,11 +793,49 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     finish_request(t, r, EBPO_E_IO, why);
 }
 
-/* Ends an attempt: finishes the request, or schedules another attempt. `code`: libcurl's result. */
+/* Ends an attempt of a request: finishes the request, or schedules another attempt. `joined`: the
+ * attempt was for several ranges. `code`: libcurl's result. */
+static void end_request(ebpo_transfers *t, ebpo_slot *s, bool joined, CURLcode code, double now)
+{
+    ebpo_request *r = s->request;
+    bool usable = s->has_verdict && !s->stopped &&
+                  (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
+    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED) {
+        finish_request(t, r, s->status, s->why);
+        if (s->response.code == 404 || s->response.code == 410)
+            r->error.system_error = ENOENT;
+    } else if (joined ? r->got == r->size : usable && keep_arrived(s, code)) {
+        finish_request(t, r, EBPO_OK, NULL);
+    } else if (s->has_verdict && s->verdict == EBPO_HTTP_SINGLY) {
+        r->got = 0;
+        enqueue_request(t, r);
+    } else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
+               (s->has_verdict && s->verdict == EBPO_HTTP_LATER)) {
+        try_again(t, s, code, now);
+    } else {
+        finish_request(t, r, EBPO_E_IO, error_text(s, code));
+    }
+}
+
+/* Sets t->joining after an attempt for several ranges. If parts are missing although the response
+ * is complete, the verdict becomes EBPO_HTTP_SINGLY. */
+static void judge_joining(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
+{
+    for (const ebpo_request *r = s->request; r && code == CURLE_OK; r = r->next)
+        if (s->verdict == EBPO_HTTP_PARTS && r->got < r->size)
+            s->verdict = EBPO_HTTP_SINGLY;
+    if (s->has_verdict && s->verdict == EBPO_HTTP_SINGLY)
+        t->joining = JOINING_FAILS;
+    else if (s->has_verdict && s->verdict == EBPO_HTTP_PARTS && t->joining == JOINING_TRIED)
+        t->joining = JOINING_WORKS;
+}
+
+/* Ends an attempt. `code`: libcurl's result. */
 static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
     long connections = 0, redirects = 0;
     ebpo_request *r = s->request;
+    bool joined = r->next != NULL;
     double now = ebpo_seconds();
     curl_easy_getinfo(s->easy, CURLINFO_NUM_CONNECTS, &connections);
     curl_easy_getinfo(s->easy, CURLINFO_REDIRECT_COUNT, &redirects);
@@ -691,19 +847,13 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.bytes += s->received;
     t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
-    bool usable = s->has_verdict && !s->stopped &&
-                  (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
-    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED) {
-        finish_request(t, r, s->status, s->why);
-        if (s->response.code == 404 || s->response.code == 410)
-            r->error.system_error = ENOENT;
-    } else if (usable && keep_arrived(s, code))
-        finish_request(t, r, EBPO_OK, NULL);
-    else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
-             (s->has_verdict && s->verdict == EBPO_HTTP_LATER))
-        try_again(t, s, code, now);
-    else
-        finish_request(t, r, EBPO_E_IO, error_text(s, code));
+    if (joined)
+        judge_joining(t, s, code);
+    for (ebpo_request *next; r; r = next) {
+        next = r->next;
+        s->request = r;
+        end_request(t, s, joined, code, now);
+    }
     s->request = NULL;
     pthread_mutex_unlock(t->lock);
 }
@@ -765,6 +915,17 @@ static ebpo_slot *free_slot(ebpo_transfers *t)
     return NULL;
 }
 
+/* Ends all requests of a slot that is not running. */
+static void finish_slot(ebpo_transfers *t, ebpo_slot *s, ebpo_status status, const char *why)
+{
+    for (ebpo_request *r = s->request, *next; r; r = next) {
+        next = r->next;
+        finish_request(t, r, status, why);
+    }
+    s->request = NULL;
+    t->active--;
+}
+
 /* Starts the requests that are due. Returns false when the thread must end. Reduces *wait as
  * next_due does. */
 static bool start_due(ebpo_transfers *t, double *wait)
@@ -776,12 +937,10 @@ static bool start_due(ebpo_transfers *t, double *wait)
         cancel_queue(t);
     while (!quit && (r = next_due(t, ebpo_seconds(), wait)) != NULL) {
         ebpo_slot *s = free_slot(t);
+        join_requests(t, r, ebpo_seconds());
         begin_attempt(t, s, r, ebpo_seconds());
-        if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK) {
-            t->active--;
-            s->request = NULL;
-            finish_request(t, r, EBPO_E_IO, "libcurl cannot take another request");
-        }
+        if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK)
+            finish_slot(t, s, EBPO_E_IO, "libcurl cannot take another request");
     }
     pthread_mutex_unlock(t->lock);
     return !quit;
@@ -800,12 +959,8 @@ static void check_stop(ebpo_transfers *t)
     t->cancelled = true;
     cancel_queue(t);
     for (unsigned i = 0; i < t->slot_count; i++)
-        if (t->slots[i].request) {
-            finish_request(t, t->slots[i].request, EBPO_E_CANCELLED,
-                           "reading was stopped on request");
-            t->slots[i].request = NULL;
-            t->active--;
-        }
+        if (t->slots[i].request)
+            finish_slot(t, &t->slots[i], EBPO_E_CANCELLED, "reading was stopped on request");
     pthread_mutex_unlock(t->lock);
 }
 

@@ -784,7 +784,7 @@ static ebpo_verdict judged(const char *const *lines, const ebpo_http_version *pi
                            char why[EBPO_WHY_BYTES])
 {
     ebpo_http_response result = { .code = 0 };
-    ebpo_http_request request = { 100, 200, pinned, 1000, false };
+    ebpo_http_request request = { 100, 200, pinned, 1000, false, false };
     ebpo_status status;
     for (; *lines; lines++)
         ebpo_http_response_line(&result, *lines, strlen(*lines));
@@ -864,7 +864,7 @@ START_TEST(test_http_ranges_beyond_4_gib)
     for (size_t i = 0; i < sizeof results / sizeof *results; i++) {
         ebpo_http_response result = { .code = 0 };
         ebpo_http_request request = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000,
-                                      false };
+                                      false, false };
         ebpo_status status;
         const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", results[i].line };
         for (int k = 0; k < 3; k++)
@@ -892,7 +892,7 @@ START_TEST(test_http_long_etags_compare_fully)
     ebpo_http_response second = {
         .code = 206, .has_range = true, .has_total = true, .begin = 100, .last = 199, .total = 5000
     };
-    ebpo_http_request request = { 100, 200, &pinned, 1000, false };
+    ebpo_http_request request = { 100, 200, &pinned, 1000, false, false };
     ebpo_status status;
     ebpo_http_response_line(&second, line, sizeof line);
     ck_assert_int_eq(ebpo_http_response_judge(&second, &request, &status, why), EBPO_HTTP_PART);
