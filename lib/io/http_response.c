@@ -186,6 +186,9 @@ void ebpo_http_response_line(ebpo_http_response *a, const char *line, size_t siz
         keep_boundary(a->boundary, text, length);
     } else if (parse_field(line, size, "last-modified", &text, &length)) {
         keep_text(a->modified, text, length);
+    } else if (parse_field(line, size, "server", &text, &length)) {
+        a->joins = (length >= 5 && memcmp(text, "nginx", 5) == 0) ||
+                   (length >= 6 && memcmp(text, "Apache", 6) == 0);
     }
 }
 

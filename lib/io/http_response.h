@@ -34,6 +34,7 @@ typedef struct ebpo_http_response {
     bool has_length; /* Content-Length exists: `length` */
     bool chunked;    /* Transfer-Encoding: chunked */
     bool encoded;    /* Content-Encoding, other than identity */
+    bool joins;      /* Server names a program that sends several ranges in one response */
     uint64_t begin, last, total, length;
     char etag[EBPO_HTTP_TAG_BYTES], modified[EBPO_HTTP_TAG_BYTES];
     char type[EBPO_HTTP_TYPE_BYTES];         /* content type in lower case: "text/html" */

@@ -7,10 +7,10 @@
  * the caller's credentials are not sent to another server. The lock belongs to the caller
  * (http_transfer.h).
  *
- * Small requests share one attempt, which asks for several ranges (`Range: bytes=0-9,50-59`). Some
- * servers, such as object stores, send the whole file instead. Therefore the first such attempt is
- * made only when many requests wait. After any other response than the requested parts, or wrong
- * parts, each range is requested alone, also all later ones. */
+ * Small requests share an attempt, which asks for several ranges (`Range: bytes=0-9,50-59`), if the
+ * server names itself as a program that supports this. (Other servers, such as object stores, would
+ * begin to send the whole file.) The first such attempt asks for the two halves of one range. After
+ * any other response than the requested parts, each range is requested alone. */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -123,7 +123,6 @@ enum { EBPO_SLOTS_MAX = 32 };
 enum {
     JOINED_MAX = 64,           /* most requests that share an attempt */
     JOINED_BYTES = 128 << 10,  /* most bytes of these requests */
-    JOINED_FIRST = 16,         /* requests that wait before the first shared attempt */
     PART_OVERHEAD_BYTES = 1024 /* most bytes between two parts, on average */
 };
 
@@ -138,6 +137,7 @@ typedef struct ebpo_slot {
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
+    bool joined; /* the attempt asks for several ranges */
     /* has_verdict: `verdict` is set. stopped: a callback below has ended the transfer. stalled:
      * check_stall has ended the transfer, because no bytes arrived */
     bool has_verdict, stopped, stalled;
@@ -172,10 +172,9 @@ struct ebpo_transfers {
     ebpo_http_version pinned;
     bool is_pinned;
     enum {
-        JOINING_UNTRIED, /* no attempt was for several ranges */
-        JOINING_TRIED,   /* no response yet */
-        JOINING_WORKS,
-        JOINING_FAILS /* each attempt is for one range */
+        JOINING_FAILS,    /* each attempt is for one range */
+        JOINING_EXPECTED, /* by the name of the server */
+        JOINING_WORKS
     } joining;
     ebpo_http_stats stats;
     uint64_t random; /* state of random numbers, used only by the thread */
@@ -243,7 +242,7 @@ static void judge_slot(ebpo_slot *s)
                                        s->is_pinned ? &s->pinned : NULL,
                                        s->owner->options->whole_limit,
                                        s->owner->options->unversioned,
-                                       s->request->next != NULL };
+                                       s->joined };
     if (!s->has_verdict)
         s->verdict = ebpo_http_response_judge(&s->response, &http_request, &s->status, s->why);
     s->has_verdict = true;
@@ -273,18 +272,18 @@ static size_t receive_part(ebpo_slot *s, const char *bytes, size_t size)
     return size;
 }
 
-/* Begins the part whose head is complete. Returns false if no request is waiting for this part. */
+/* Begins the part whose head is complete. Returns false if no request needs this part next. */
 static bool begin_part(ebpo_slot *s)
 {
     const ebpo_http_response *head = &s->head.response;
     ebpo_status status;
     char why[EBPO_WHY_BYTES];
     ebpo_request *r = s->request;
-    while (r && (r->offset != head->begin || r->got))
+    while (r && (r->got == r->size || r->offset + r->got != head->begin))
         r = r->next;
     if (!r)
         return false;
-    ebpo_http_request wanted = { .begin = r->offset,
+    ebpo_http_request wanted = { .begin = r->offset + r->got,
                                  .end = r->offset + r->size,
                                  .pinned = &s->pinned,
                                  .unversioned = s->owner->options->unversioned };
@@ -557,7 +556,7 @@ void ebpo_transfers_pin(ebpo_transfers *t, const ebpo_http_version *version)
     t->is_pinned = true;
 }
 
-bool ebpo_transfers_join(const ebpo_transfers *t) { return t->joining == JOINING_WORKS; }
+bool ebpo_transfers_joins(const ebpo_transfers *t) { return t->joining == JOINING_WORKS; }
 
 void ebpo_transfers_add_stats(const ebpo_transfers *t, ebpo_http_stats *stats)
 {
@@ -596,10 +595,18 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
     return *by_server ? (double)retry_after : pause;
 }
 
-/* Returns true if a request may share an attempt with others. After a failure, it may not. */
-static bool can_join(const ebpo_transfers *t, const ebpo_request *r, double now)
+/* Returns true if the bytes of a further response may complete the received bytes. Returns false if
+ * the file's version is not known, because the two responses might be of different versions. */
+static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
 {
-    return t->joining != JOINING_FAILS && t->is_pinned && r->size < JOINED_BYTES && !r->failures &&
+    const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
+    return *v->etag || *v->modified || t->options->unversioned;
+}
+
+/* Returns true if a request may share an attempt with others. After a failure, it may not. */
+static bool can_share(const ebpo_transfers *t, const ebpo_request *r, double now)
+{
+    return t->joining != JOINING_FAILS && t->is_pinned && may_join(t, r) && !r->failures &&
            !r->got && r->due <= now;
 }
 
@@ -608,16 +615,12 @@ static bool can_join(const ebpo_transfers *t, const ebpo_request *r, double now)
 static void join_requests(ebpo_transfers *t, ebpo_request *r, double now)
 {
     ebpo_request *last = r;
-    uint64_t bytes = r->size, waiting = 1;
-    r->next = NULL;
-    for (const ebpo_request *q = t->queue; q && t->joining == JOINING_UNTRIED; q = q->next)
-        waiting += can_join(t, q, now);
-    if (!can_join(t, r, now) || (t->joining == JOINING_UNTRIED && waiting < JOINED_FIRST))
-        return;
+    uint64_t bytes = r->size;
     unsigned count = 1;
-    for (ebpo_request **at = &t->queue; *at && count < JOINED_MAX;) {
+    r->next = NULL;
+    for (ebpo_request **at = &t->queue; can_share(t, r, now) && *at && count < JOINED_MAX;) {
         ebpo_request *q = *at;
-        if (!can_join(t, q, now) || q->offset < last->offset + last->size ||
+        if (!can_share(t, q, now) || q->offset < last->offset + last->size ||
             bytes + q->size > JOINED_BYTES) {
             at = &q->next;
             continue;
@@ -628,8 +631,25 @@ static void join_requests(ebpo_transfers *t, ebpo_request *r, double now)
         bytes += q->size;
         count++;
     }
-    if (count > 1 && t->joining == JOINING_UNTRIED)
-        t->joining = JOINING_TRIED;
+}
+
+/* Writes the ranges of an attempt for the header field Range. */
+static void write_ranges(const ebpo_slot *s, char *range, size_t capacity)
+{
+    const ebpo_request *r = s->request;
+    uint64_t middle = s->begin + (s->end - s->begin) / 2;
+    size_t length = 0;
+    if (s->joined && !r->next) {
+        snprintf(range, capacity, "%" PRIu64 "-%" PRIu64 ",%" PRIu64 "-%" PRIu64, s->begin,
+                 middle - 1, middle, s->end - 1);
+        return;
+    }
+    snprintf(range, capacity, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
+    while ((r = r->next) != NULL) {
+        length += strlen(range + length);
+        snprintf(range + length, capacity - length, ",%" PRIu64 "-%" PRIu64, r->offset,
+                 r->offset + r->size - 1);
+    }
 }
 
 /* Prepares a slot for the next attempt of a request, or of a list of requests. The attempt requests
@@ -637,7 +657,6 @@ static void join_requests(ebpo_transfers *t, ebpo_request *r, double now)
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
     char range[JOINED_MAX * 42];
-    int length = 0;
     bool has_version = r->first && r->got > 0;
     s->request = r;
     s->is_pinned = t->is_pinned || has_version;
@@ -655,11 +674,10 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
         if (q->deadline <= 0)
             q->deadline = now + t->options->time_limit;
         deadline = q->deadline < deadline ? q->deadline : deadline;
-        length +=
-            snprintf(range + length, sizeof range - (size_t)length, "%s%" PRIu64 "-%" PRIu64,
-                     q == r ? "" : ",", q == r ? s->begin : q->offset, q->offset + q->size - 1);
     }
     double remaining_ms = (deadline - now) * 1000;
+    s->joined = r->next || (t->joining == JOINING_EXPECTED && r->size > 1 && can_share(t, r, now));
+    write_ranges(s, range, sizeof range);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
     if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
@@ -704,6 +722,7 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
         return code == CURLE_OK;
     }
     if (r->first) {
+        s->owner->joining = s->response.joins ? JOINING_EXPECTED : JOINING_FAILS;
         r->version.size = s->response.total;
         if (s->response.total < r->offset + r->size)
             r->size = s->response.total - r->offset;
@@ -740,14 +759,6 @@ static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t 
                  s->end - s->begin);
     else
         snprintf(out, capacity, "%s", trouble);
-}
-
-/* Returns true if the bytes of a further response may complete the received bytes. Returns false if
- * the file's version is not known, because the two responses might be of different versions. */
-static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
-{
-    const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
-    return *v->etag || *v->modified || t->options->unversioned;
 }
 
 /* Schedules another attempt, or ends the request. */
@@ -793,9 +804,9 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     finish_request(t, r, EBPO_E_IO, why);
 }
 
-/* Ends an attempt of a request: finishes the request, or schedules another attempt. `joined`: the
- * attempt was for several ranges. `code`: libcurl's result. */
-static void end_request(ebpo_transfers *t, ebpo_slot *s, bool joined, CURLcode code, double now)
+/* Ends an attempt for the request s->request: finishes the request, or schedules another attempt.
+ * `code`: libcurl's result. */
+static void end_request(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now)
 {
     ebpo_request *r = s->request;
     bool usable = s->has_verdict && !s->stopped &&
@@ -804,7 +815,7 @@ static void end_request(ebpo_transfers *t, ebpo_slot *s, bool joined, CURLcode c
         finish_request(t, r, s->status, s->why);
         if (s->response.code == 404 || s->response.code == 410)
             r->error.system_error = ENOENT;
-    } else if (joined ? r->got == r->size : usable && keep_arrived(s, code)) {
+    } else if (s->joined ? r->got == r->size : usable && keep_arrived(s, code)) {
         finish_request(t, r, EBPO_OK, NULL);
     } else if (s->has_verdict && s->verdict == EBPO_HTTP_SINGLY) {
         r->got = 0;
@@ -826,7 +837,7 @@ static void judge_joining(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
             s->verdict = EBPO_HTTP_SINGLY;
     if (s->has_verdict && s->verdict == EBPO_HTTP_SINGLY)
         t->joining = JOINING_FAILS;
-    else if (s->has_verdict && s->verdict == EBPO_HTTP_PARTS && t->joining == JOINING_TRIED)
+    else if (s->has_verdict && s->verdict == EBPO_HTTP_PARTS && t->joining == JOINING_EXPECTED)
         t->joining = JOINING_WORKS;
 }
 
@@ -835,7 +846,6 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
     long connections = 0, redirects = 0;
     ebpo_request *r = s->request;
-    bool joined = r->next != NULL;
     double now = ebpo_seconds();
     curl_easy_getinfo(s->easy, CURLINFO_NUM_CONNECTS, &connections);
     curl_easy_getinfo(s->easy, CURLINFO_REDIRECT_COUNT, &redirects);
@@ -847,12 +857,12 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.bytes += s->received;
     t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
-    if (joined)
+    if (s->joined)
         judge_joining(t, s, code);
     for (ebpo_request *next; r; r = next) {
         next = r->next;
         s->request = r;
-        end_request(t, s, joined, code, now);
+        end_request(t, s, code, now);
     }
     s->request = NULL;
     pthread_mutex_unlock(t->lock);

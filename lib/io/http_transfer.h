@@ -59,7 +59,7 @@ void ebpo_transfers_urge(ebpo_transfers *transfers, ebpo_request *request);
 /* Lock held. From now on, refuses responses with another version than `version`. */
 void ebpo_transfers_pin(ebpo_transfers *transfers, const ebpo_http_version *version);
 /* Lock held. Returns true if the server has sent several ranges in one response. */
-bool ebpo_transfers_join(const ebpo_transfers *transfers);
+bool ebpo_transfers_joins(const ebpo_transfers *transfers);
 /* Lock held. Adds the numbers of requests, retries, connections and bytes to *stats. */
 void ebpo_transfers_add_stats(const ebpo_transfers *transfers, ebpo_http_stats *stats);
 
