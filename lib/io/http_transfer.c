@@ -9,8 +9,8 @@
  *
  * Small requests share an attempt, which asks for several ranges (`Range: bytes=0-9,50-59`), if the
  * server names itself as a program that supports this. (Other servers, such as object stores, would
- * begin to send the whole file.) The first such attempt asks for the two halves of one range. After
- * any other response than the requested parts, each range is requested alone. */
+ * begin to send the whole file.) The first such attempt also asks for the first byte of the file.
+ * After any other response than the requested parts, each range is requested alone. */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -151,7 +151,9 @@ typedef struct ebpo_slot {
     /* of several ranges: the head of the current part, its request, and its missing bytes */
     ebpo_part_head head;
     ebpo_request *part;
-    uint64_t part_left, between;   /* between: bytes that are not part of a range */
+    uint64_t part_left, between; /* between: bytes that are not part of a range */
+    ebpo_request extra;          /* of the first byte of the file */
+    uint8_t first_byte;
     char trouble[CURL_ERROR_SIZE]; /* libcurl's error message */
 } ebpo_slot;
 
@@ -633,22 +635,14 @@ static void join_requests(ebpo_transfers *t, ebpo_request *r, double now)
     }
 }
 
-/* Writes the ranges of an attempt for the header field Range. */
-static void write_ranges(const ebpo_slot *s, char *range, size_t capacity)
+/* Writes the ranges of a list of requests for the header field Range. */
+static void write_ranges(const ebpo_request *r, char *range, size_t capacity)
 {
-    const ebpo_request *r = s->request;
-    uint64_t middle = s->begin + (s->end - s->begin) / 2;
     size_t length = 0;
-    if (s->joined && !r->next) {
-        snprintf(range, capacity, "%" PRIu64 "-%" PRIu64 ",%" PRIu64 "-%" PRIu64, s->begin,
-                 middle - 1, middle, s->end - 1);
-        return;
-    }
-    snprintf(range, capacity, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
-    while ((r = r->next) != NULL) {
+    for (const char *comma = ""; r; r = r->next, comma = ",") {
+        snprintf(range + length, capacity - length, "%s%" PRIu64 "-%" PRIu64, comma,
+                 r->offset + (r->whole ? 0 : r->got), r->offset + r->size - 1);
         length += strlen(range + length);
-        snprintf(range + length, capacity - length, ",%" PRIu64 "-%" PRIu64, r->offset,
-                 r->offset + r->size - 1);
     }
 }
 
@@ -656,7 +650,7 @@ static void write_ranges(const ebpo_slot *s, char *range, size_t capacity)
  * only the bytes that are still missing. */
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
-    char range[JOINED_MAX * 42];
+    char range[(JOINED_MAX + 1) * 42];
     bool has_version = r->first && r->got > 0;
     s->request = r;
     s->is_pinned = t->is_pinned || has_version;
@@ -676,8 +670,12 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
         deadline = q->deadline < deadline ? q->deadline : deadline;
     }
     double remaining_ms = (deadline - now) * 1000;
-    s->joined = r->next || (t->joining == JOINING_EXPECTED && r->size > 1 && can_share(t, r, now));
-    write_ranges(s, range, sizeof range);
+    if (t->joining == JOINING_EXPECTED && can_share(t, r, now)) {
+        s->extra = (ebpo_request){ .size = 1, .data = &s->first_byte, .next = r };
+        s->request = &s->extra;
+    }
+    s->joined = s->request->next != NULL;
+    write_ranges(s->request, range, sizeof range);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
     if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
@@ -832,13 +830,19 @@ static void end_request(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double n
  * is complete, the verdict becomes EBPO_HTTP_SINGLY. */
 static void judge_joining(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
-    for (const ebpo_request *r = s->request; r && code == CURLE_OK; r = r->next)
-        if (s->verdict == EBPO_HTTP_PARTS && r->got < r->size)
-            s->verdict = EBPO_HTTP_SINGLY;
-    if (s->has_verdict && s->verdict == EBPO_HTTP_SINGLY)
-        t->joining = JOINING_FAILS;
-    else if (s->has_verdict && s->verdict == EBPO_HTTP_PARTS && t->joining == JOINING_EXPECTED)
+    bool parts = s->has_verdict && s->verdict == EBPO_HTTP_PARTS;
+    const ebpo_request *r = s->request;
+    while (r && r->got == r->size)
+        r = r->next;
+    if (parts && r && code == CURLE_OK) {
+        s->verdict = EBPO_HTTP_SINGLY;
+        parts = false;
+    }
+    bool refused = s->has_verdict && s->verdict == EBPO_HTTP_SINGLY;
+    if (parts && t->joining == JOINING_EXPECTED)
         t->joining = JOINING_WORKS;
+    else if (refused || (!parts && t->joining == JOINING_EXPECTED))
+        t->joining = JOINING_FAILS;
 }
 
 /* Ends an attempt. `code`: libcurl's result. */
@@ -862,7 +866,8 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     for (ebpo_request *next; r; r = next) {
         next = r->next;
         s->request = r;
-        end_request(t, s, code, now);
+        if (r != &s->extra)
+            end_request(t, s, code, now);
     }
     s->request = NULL;
     pthread_mutex_unlock(t->lock);
