@@ -122,7 +122,8 @@ def check(tool, folder, path, ply, points_file, rays, site):
 
     # Few requests to a server that sends several ranges; one more when it does not.
     for query in ("inside", "distance"):
-        said = [run(tool, query, f"{site}/{fault}/r", points_file, "--memory=12MiB", "--stats").stderr.decode()
+        said = [run(tool, query, f"{site}/{fault}/r", points_file, "--raw", "--memory=12MiB",
+                    "--stats").stderr.decode()
                 for fault in ("good", "several-0", "several-4")]
         alone, several, refused = (int(re.search(r"requests (\d+)", each)[1]) for each in said)
         expect(f"{query}: several ranges in one request", several <= 0.8 * alone and refused <= alone + 2, said)
