@@ -408,6 +408,16 @@ START_TEST(test_http_several_ranges_take_one_request)
                   (int)stats.requests);
     ck_assert_msg(stats.retries == several[_i].retries, "%s: %d retries", fault,
                   (int)stats.retries);
+    /* once it works, short gaps between ranges are not requested */
+    for (uint64_t i = 0; i < 40; i++)
+        ranges[i] = (ebpo_range){ 2700000 + i * 5000, 100 };
+    s.prefetch(s.user, ranges, 40);
+    for (int i = 0; i < 40; i++)
+        ck_assert_int_eq(read_one(&s, ranges[i].offset, ranges[i].size, &error), EBPO_OK);
+    ebpo_http_stats more = stats_of(&s);
+    ck_assert_uint_eq(more.requests, stats.requests + 1);
+    if (several[_i].requests == 3)
+        ck_assert_uint_lt(more.bytes - stats.bytes, 15000);
     s.close(s.user);
 }
 END_TEST
