@@ -355,6 +355,7 @@ enum {
     GAP_BYTES = 16384,
     MANY = 256, /* if a hint has more ranges, GAP_BYTES_OF_MANY is used instead */
     GAP_BYTES_OF_MANY = 32768,
+    GAP_BYTES_JOINED = 1024, /* if one request fetches several ranges */
     STALE_AFTER =
         64 /* after this number of later hints, a hinted range will probably not be read */
 };
@@ -648,7 +649,9 @@ static void add_wanted(ebpo_range_cache *p, const ebpo_range *hinted)
  * close together become one cached range. */
 static void record_ranges(ebpo_range_cache *p, const ebpo_range *sorted, size_t count)
 {
-    uint64_t before = p->count, gap = count > MANY ? GAP_BYTES_OF_MANY : GAP_BYTES;
+    uint64_t before = p->count, gap = ebpo_transfers_joins(p->transfers) ? GAP_BYTES_JOINED
+                                      : count > MANY                     ? GAP_BYTES_OF_MANY
+                                                                         : GAP_BYTES;
     p->hinting = true;
     for (size_t i = 0; i < count;) {
         uint64_t begin = sorted[i].offset, end = begin + sorted[i].size;

@@ -1,6 +1,7 @@
 /* Parses the head of a server's response line by line, and compares the response with the request.
- * A response may send a part of the file or the whole file, or may ask to try again later. All
- * other responses are refused. Ranges, lengths, versions (entity tags or dates) and encodings must
+ * A response may send a part of the file, several parts or the whole file, or may ask to try again
+ * later. Each of several parts is judged like a response of its own. All other responses are
+ * refused. Ranges, lengths, versions (entity tags or dates) and encodings must
  * match the request. This file reads nothing from the network, so tests and fuzzers can pass any
  * bytes. Source: RFC 9110, sections 8.8, 14 and 15. */
 #include <ctype.h>
@@ -99,6 +100,28 @@ static void keep_type(char out[EBPO_HTTP_TYPE_BYTES], const char *text, size_t l
     out[i] = 0;
 }
 
+/* Stores the boundary of `multipart/byteranges; boundary="THIS"`. Stores "" if there is none, or if
+ * it is too long. */
+static void keep_boundary(char out[EBPO_HTTP_BOUNDARY_BYTES], const char *text, size_t length)
+{
+    static const char name[] = "boundary=";
+    const char *at = memchr(text, ';', length), *end = text + length;
+    out[0] = 0;
+    while (at && at < end && (*at == ';' || *at == ' '))
+        at++;
+    if (!at || (size_t)(end - at) < sizeof name || strncasecmp(at, name, sizeof name - 1) != 0)
+        return;
+    at += sizeof name - 1;
+    bool quoted = parse_token(&at, end, '"');
+    size_t size = 0;
+    while (at + size < end && (quoted ? at[size] != '"' : at[size] != ';' && at[size] != ' '))
+        size++;
+    if (size >= EBPO_HTTP_BOUNDARY_BYTES)
+        return;
+    memcpy(out, at, size);
+    out[size] = 0;
+}
+
 bool ebpo_http_response_is_text(const char *type)
 {
     size_t length = strlen(type);
@@ -160,8 +183,12 @@ void ebpo_http_response_line(ebpo_http_response *a, const char *line, size_t siz
         keep_text(a->etag, text + weak, length - weak);
     } else if (parse_field(line, size, "content-type", &text, &length)) {
         keep_type(a->type, text, length);
+        keep_boundary(a->boundary, text, length);
     } else if (parse_field(line, size, "last-modified", &text, &length)) {
         keep_text(a->modified, text, length);
+    } else if (parse_field(line, size, "server", &text, &length)) {
+        a->joins = (length >= 5 && memcmp(text, "nginx", 5) == 0) ||
+                   (length >= 6 && memcmp(text, "Apache", 6) == 0);
     }
 }
 
@@ -275,6 +302,11 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
         snprintf(why, EBPO_WHY_BYTES, "the server returned status %d", a->code);
         return EBPO_HTTP_LATER;
     }
+    if (request->several)
+        return a->code == 206 && !a->encoded && *a->boundary &&
+                       strcmp(a->type, "multipart/byteranges") == 0
+                   ? EBPO_HTTP_PARTS
+                   : EBPO_HTTP_SINGLY;
     if (a->code == 416 && request->pinned)
         return give_verdict(
             EBPO_HTTP_REFUSED, why,
@@ -298,4 +330,48 @@ ebpo_verdict ebpo_http_response_judge(const ebpo_http_response *a, const ebpo_ht
                             "the server compressed the file, which was not requested "
                             "(Content-Encoding); switch off this compression on the server");
     return a->code == 206 ? judge_part(a, request, why) : judge_whole(a, request, status, why);
+}
+
+/* --- bodies with several ranges --- */
+
+/* Reads a line before a boundary, without its end. Returns false if the line is neither empty nor
+ * the boundary. */
+static bool take_boundary(ebpo_part_head *h, const ebpo_http_response *whole, size_t length)
+{
+    size_t mark = strlen(whole->boundary);
+    if (length == 0 || h->ended)
+        return true;
+    if (length < mark + 2 || memcmp(h->line, "--", 2) != 0 ||
+        memcmp(h->line + 2, whole->boundary, mark) != 0)
+        return false;
+    const char *rest = h->line + mark + 2;
+    h->ended = length == mark + 4 && memcmp(rest, "--", 2) == 0;
+    h->in_head = length == mark + 2;
+    h->response = *whole;
+    return h->ended || h->in_head;
+}
+
+size_t ebpo_part_head_take(ebpo_part_head *h, const ebpo_http_response *whole, const char *bytes,
+                           size_t size, bool *complete)
+{
+    const char *end = memchr(bytes, '\n', size);
+    size_t step = end ? (size_t)(end - bytes) + 1 : size;
+    *complete = false;
+    if (step > sizeof h->line - h->length)
+        return 0;
+    memcpy(h->line + h->length, bytes, step);
+    h->length += step;
+    if (!end)
+        return step;
+    size_t length = h->length - 1;
+    if (length && h->line[length - 1] == '\r')
+        length--;
+    h->length = 0;
+    if (!h->in_head)
+        return take_boundary(h, whole, length) ? step : 0;
+    if (length)
+        ebpo_http_response_line(&h->response, h->line, length);
+    *complete = length == 0;
+    h->in_head = !*complete;
+    return step;
 }

@@ -5,7 +5,12 @@
  * off, the received bytes are kept, and the next attempt requests the missing bytes, after a pause
  * that grows with each attempt. At most five redirects are followed, never from https to http, and
  * the caller's credentials are not sent to another server. The lock belongs to the caller
- * (http_transfer.h). */
+ * (http_transfer.h).
+ *
+ * Small requests share an attempt, which asks for several ranges (`Range: bytes=0-9,50-59`), if the
+ * server names itself as a program that supports this. (Other servers, such as object stores, would
+ * begin to send the whole file.) The first such attempt also asks for the first byte of the file.
+ * After any other response than the requested parts, each range is requested alone. */
 #include <curl/curl.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -115,17 +120,24 @@ static bool take_redirect_line(ebpo_redirect *r, const char *url, int code, cons
 
 enum { EBPO_SLOTS_MAX = 32 };
 
+enum {
+    JOINED_MAX = 64,           /* most requests that share an attempt */
+    JOINED_BYTES = 128 << 10,  /* most bytes of these requests */
+    PART_OVERHEAD_BYTES = 1024 /* most bytes between two parts, on average */
+};
+
 typedef struct ebpo_transfers ebpo_transfers;
 
 /* A slot for running requests, with a reusable handle. */
 typedef struct ebpo_slot {
     ebpo_transfers *owner;
     CURL *easy;
-    ebpo_request *request;    /* NULL: free */
+    ebpo_request *request;    /* NULL: free; else the first of a list, by offset */
     ebpo_http_version pinned; /* the required version, copied for this attempt */
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
+    bool joined; /* the attempt asks for several ranges */
     /* has_verdict: `verdict` is set. stopped: a callback below has ended the transfer. stalled:
      * check_stall has ended the transfer, because no bytes arrived */
     bool has_verdict, stopped, stalled;
@@ -136,7 +148,13 @@ typedef struct ebpo_slot {
     char why[EBPO_WHY_BYTES];
     uint64_t begin, end;                /* range of this attempt */
     uint64_t received, taken, unwanted; /* bytes of the body: all, accepted, ignored */
-    char trouble[CURL_ERROR_SIZE];      /* libcurl's error message */
+    /* of several ranges: the head of the current part, its request, and its missing bytes */
+    ebpo_part_head head;
+    ebpo_request *part;
+    uint64_t part_left, between; /* between: bytes that are not part of a range */
+    ebpo_request extra;          /* of the first byte of the file */
+    uint8_t first_byte;
+    char trouble[CURL_ERROR_SIZE]; /* libcurl's error message */
 } ebpo_slot;
 
 struct ebpo_transfers {
@@ -155,6 +173,11 @@ struct ebpo_transfers {
     ebpo_request *queue; /* urgent requests first */
     ebpo_http_version pinned;
     bool is_pinned;
+    enum {
+        JOINING_FAILS,    /* each attempt is for one range */
+        JOINING_EXPECTED, /* by the name of the server */
+        JOINING_WORKS
+    } joining;
     ebpo_http_stats stats;
     uint64_t random; /* state of random numbers, used only by the thread */
 };
@@ -216,9 +239,12 @@ static size_t receive_header(char *line, size_t size, size_t count, void *user)
 /* Judges the response by its head. Further calls for the same attempt do nothing. */
 static void judge_slot(ebpo_slot *s)
 {
-    ebpo_http_request http_request = { s->begin, s->end, s->is_pinned ? &s->pinned : NULL,
+    ebpo_http_request http_request = { s->begin,
+                                       s->end,
+                                       s->is_pinned ? &s->pinned : NULL,
                                        s->owner->options->whole_limit,
-                                       s->owner->options->unversioned };
+                                       s->owner->options->unversioned,
+                                       s->joined };
     if (!s->has_verdict)
         s->verdict = ebpo_http_response_judge(&s->response, &http_request, &s->status, s->why);
     s->has_verdict = true;
@@ -245,6 +271,50 @@ static size_t receive_part(ebpo_slot *s, const char *bytes, size_t size)
             "the way is broken");
     memcpy(s->request->data + (s->begin - s->request->offset) + s->taken, bytes, size);
     s->taken += size;
+    return size;
+}
+
+/* Begins the part whose head is complete. Returns false if no request needs this part next. */
+static bool begin_part(ebpo_slot *s)
+{
+    const ebpo_http_response *head = &s->head.response;
+    ebpo_status status;
+    char why[EBPO_WHY_BYTES];
+    ebpo_request *r = s->request;
+    while (r && (r->got == r->size || r->offset + r->got != head->begin))
+        r = r->next;
+    if (!r)
+        return false;
+    ebpo_http_request wanted = { .begin = r->offset + r->got,
+                                 .end = r->offset + r->size,
+                                 .pinned = &s->pinned,
+                                 .unversioned = s->owner->options->unversioned };
+    s->part = r;
+    s->part_left = head->last - head->begin + 1;
+    return ebpo_http_response_judge(head, &wanted, &status, why) == EBPO_HTTP_PART;
+}
+
+/* Stores bytes of several ranges. Returns `size`, or 0 if the body has other parts. */
+static size_t receive_parts(ebpo_slot *s, const char *bytes, size_t size)
+{
+    for (size_t at = 0, step; at < size; at += step) {
+        bool complete = false;
+        step = size - at < s->part_left ? size - at : (size_t)s->part_left;
+        if (step) {
+            memcpy(s->part->data + s->part->got, bytes + at, step);
+            s->part->got += step;
+            s->part_left -= step;
+            continue;
+        }
+        step = ebpo_part_head_take(&s->head, &s->response, bytes + at, size - at, &complete);
+        s->between += step;
+        s->stopped = step == 0 || s->between > (JOINED_MAX + 1) * PART_OVERHEAD_BYTES ||
+                     (complete && !begin_part(s));
+        if (s->stopped) {
+            s->verdict = EBPO_HTTP_SINGLY;
+            return 0;
+        }
+    }
     return size;
 }
 
@@ -277,8 +347,11 @@ static size_t receive_body(char *bytes, size_t size, size_t count, void *user)
         return receive_part(s, bytes, size);
     if (s->verdict == EBPO_HTTP_WHOLE)
         return receive_whole(s, bytes, size);
+    if (s->verdict == EBPO_HTTP_PARTS)
+        return receive_parts(s, bytes, size);
     s->unwanted += size;
-    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_HTTP_REFUSED;
+    s->stopped = s->unwanted > DRAIN_BYTES || s->verdict == EBPO_HTTP_REFUSED ||
+                 s->verdict == EBPO_HTTP_SINGLY;
     return s->stopped ? 0 : size;
 }
 
@@ -485,6 +558,8 @@ void ebpo_transfers_pin(ebpo_transfers *t, const ebpo_http_version *version)
     t->is_pinned = true;
 }
 
+bool ebpo_transfers_joins(const ebpo_transfers *t) { return t->joining == JOINING_WORKS; }
+
 void ebpo_transfers_add_stats(const ebpo_transfers *t, ebpo_http_stats *stats)
 {
     stats->requests += t->stats.requests;
@@ -522,11 +597,60 @@ static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server
     return *by_server ? (double)retry_after : pause;
 }
 
-/* Prepares a slot for the next attempt of a request. The attempt requests only the bytes that are
- * still missing. */
+/* Returns true if the bytes of a further response may complete the received bytes. Returns false if
+ * the file's version is not known, because the two responses might be of different versions. */
+static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
+{
+    const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
+    return *v->etag || *v->modified || t->options->unversioned;
+}
+
+/* Returns true if a request may share an attempt with others. After a failure, it may not. */
+static bool can_share(const ebpo_transfers *t, const ebpo_request *r, double now)
+{
+    return t->joining != JOINING_FAILS && t->is_pinned && may_join(t, r) && !r->failures &&
+           !r->got && r->due <= now;
+}
+
+/* The caller holds the lock. Moves requests from the queue to the attempt of the request r. Their
+ * offsets ascend, as some servers demand. */
+static void join_requests(ebpo_transfers *t, ebpo_request *r, double now)
+{
+    ebpo_request *last = r;
+    uint64_t bytes = r->size;
+    unsigned count = 1;
+    r->next = NULL;
+    for (ebpo_request **at = &t->queue; can_share(t, r, now) && *at && count < JOINED_MAX;) {
+        ebpo_request *q = *at;
+        if (!can_share(t, q, now) || q->offset < last->offset + last->size ||
+            bytes + q->size > JOINED_BYTES) {
+            at = &q->next;
+            continue;
+        }
+        *at = q->next;
+        q->next = NULL;
+        last = last->next = q;
+        bytes += q->size;
+        count++;
+    }
+}
+
+/* Writes the ranges of a list of requests for the header field Range. */
+static void write_ranges(const ebpo_request *r, char *range, size_t capacity)
+{
+    size_t length = 0;
+    for (const char *comma = ""; r; r = r->next, comma = ",") {
+        snprintf(range + length, capacity - length, "%s%" PRIu64 "-%" PRIu64, comma,
+                 r->offset + (r->whole ? 0 : r->got), r->offset + r->size - 1);
+        length += strlen(range + length);
+    }
+}
+
+/* Prepares a slot for the next attempt of a request, or of a list of requests. The attempt requests
+ * only the bytes that are still missing. */
 static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, double now)
 {
-    char range[64];
+    char range[(JOINED_MAX + 1) * 42];
     bool has_version = r->first && r->got > 0;
     s->request = r;
     s->is_pinned = t->is_pinned || has_version;
@@ -537,11 +661,21 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
     s->why[0] = s->trouble[0] = 0;
     s->begin = r->offset + (r->whole ? 0 : r->got);
     s->end = r->offset + r->size;
-    s->received = s->taken = s->unwanted = 0;
-    if (r->deadline <= 0)
-        r->deadline = now + t->options->time_limit;
-    double remaining_ms = (r->deadline - now) * 1000;
-    snprintf(range, sizeof range, "%" PRIu64 "-%" PRIu64, s->begin, s->end - 1);
+    s->received = s->taken = s->unwanted = s->part_left = s->between = 0;
+    s->head = (ebpo_part_head){ .in_head = false };
+    double deadline = now + t->options->time_limit;
+    for (ebpo_request *q = r; q; q = q->next) {
+        if (q->deadline <= 0)
+            q->deadline = now + t->options->time_limit;
+        deadline = q->deadline < deadline ? q->deadline : deadline;
+    }
+    double remaining_ms = (deadline - now) * 1000;
+    if (t->joining == JOINING_EXPECTED && can_share(t, r, now)) {
+        s->extra = (ebpo_request){ .size = 1, .data = &s->first_byte, .next = r };
+        s->request = &s->extra;
+    }
+    s->joined = s->request->next != NULL;
+    write_ranges(s->request, range, sizeof range);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
     if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
         curl_easy_setopt(s->easy, CURLOPT_HTTPHEADER, t->headers);
@@ -586,6 +720,7 @@ static bool keep_arrived(ebpo_slot *s, CURLcode code)
         return code == CURLE_OK;
     }
     if (r->first) {
+        s->owner->joining = s->response.joins ? JOINING_EXPECTED : JOINING_FAILS;
         r->version.size = s->response.total;
         if (s->response.total < r->offset + r->size)
             r->size = s->response.total - r->offset;
@@ -622,14 +757,6 @@ static void describe_error(const ebpo_slot *s, CURLcode code, char *out, size_t 
                  s->end - s->begin);
     else
         snprintf(out, capacity, "%s", trouble);
-}
-
-/* Returns true if the bytes of a further response may complete the received bytes. Returns false if
- * the file's version is not known, because the two responses might be of different versions. */
-static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
-{
-    const ebpo_http_version *v = r->first ? &r->version : &t->pinned;
-    return *v->etag || *v->modified || t->options->unversioned;
 }
 
 /* Schedules another attempt, or ends the request. */
@@ -675,7 +802,50 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     finish_request(t, r, EBPO_E_IO, why);
 }
 
-/* Ends an attempt: finishes the request, or schedules another attempt. `code`: libcurl's result. */
+/* Ends an attempt for the request s->request: finishes the request, or schedules another attempt.
+ * `code`: libcurl's result. */
+static void end_request(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now)
+{
+    ebpo_request *r = s->request;
+    bool usable = s->has_verdict && !s->stopped &&
+                  (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
+    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED) {
+        finish_request(t, r, s->status, s->why);
+        if (s->response.code == 404 || s->response.code == 410)
+            r->error.system_error = ENOENT;
+    } else if (s->joined ? r->got == r->size : usable && keep_arrived(s, code)) {
+        finish_request(t, r, EBPO_OK, NULL);
+    } else if (s->has_verdict && s->verdict == EBPO_HTTP_SINGLY) {
+        r->got = 0;
+        enqueue_request(t, r);
+    } else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
+               (s->has_verdict && s->verdict == EBPO_HTTP_LATER)) {
+        try_again(t, s, code, now);
+    } else {
+        finish_request(t, r, EBPO_E_IO, error_text(s, code));
+    }
+}
+
+/* Sets t->joining after an attempt for several ranges. If parts are missing although the response
+ * is complete, the verdict becomes EBPO_HTTP_SINGLY. */
+static void judge_joining(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
+{
+    bool parts = s->has_verdict && s->verdict == EBPO_HTTP_PARTS;
+    const ebpo_request *r = s->request;
+    while (r && r->got == r->size)
+        r = r->next;
+    if (parts && r && code == CURLE_OK) {
+        s->verdict = EBPO_HTTP_SINGLY;
+        parts = false;
+    }
+    bool refused = s->has_verdict && s->verdict == EBPO_HTTP_SINGLY;
+    if (parts && t->joining == JOINING_EXPECTED)
+        t->joining = JOINING_WORKS;
+    else if (refused || (!parts && t->joining == JOINING_EXPECTED))
+        t->joining = JOINING_FAILS;
+}
+
+/* Ends an attempt. `code`: libcurl's result. */
 static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
 {
     long connections = 0, redirects = 0;
@@ -691,19 +861,14 @@ static void end_attempt(ebpo_transfers *t, ebpo_slot *s, CURLcode code)
     t->stats.bytes += s->received;
     t->stats.connections += (uint64_t)(connections > 0 ? connections : 0);
     t->stats.requests += (uint64_t)(redirects > 0 ? redirects : 0);
-    bool usable = s->has_verdict && !s->stopped &&
-                  (s->verdict == EBPO_HTTP_PART || s->verdict == EBPO_HTTP_WHOLE);
-    if (s->has_verdict && s->verdict == EBPO_HTTP_REFUSED) {
-        finish_request(t, r, s->status, s->why);
-        if (s->response.code == 404 || s->response.code == 410)
-            r->error.system_error = ENOENT;
-    } else if (usable && keep_arrived(s, code))
-        finish_request(t, r, EBPO_OK, NULL);
-    else if (code == CURLE_OK || s->stalled || is_temporary(code) ||
-             (s->has_verdict && s->verdict == EBPO_HTTP_LATER))
-        try_again(t, s, code, now);
-    else
-        finish_request(t, r, EBPO_E_IO, error_text(s, code));
+    if (s->joined)
+        judge_joining(t, s, code);
+    for (ebpo_request *next; r; r = next) {
+        next = r->next;
+        s->request = r;
+        if (r != &s->extra)
+            end_request(t, s, code, now);
+    }
     s->request = NULL;
     pthread_mutex_unlock(t->lock);
 }
@@ -765,6 +930,17 @@ static ebpo_slot *free_slot(ebpo_transfers *t)
     return NULL;
 }
 
+/* Ends all requests of a slot that is not running. */
+static void finish_slot(ebpo_transfers *t, ebpo_slot *s, ebpo_status status, const char *why)
+{
+    for (ebpo_request *r = s->request, *next; r; r = next) {
+        next = r->next;
+        finish_request(t, r, status, why);
+    }
+    s->request = NULL;
+    t->active--;
+}
+
 /* Starts the requests that are due. Returns false when the thread must end. Reduces *wait as
  * next_due does. */
 static bool start_due(ebpo_transfers *t, double *wait)
@@ -776,12 +952,10 @@ static bool start_due(ebpo_transfers *t, double *wait)
         cancel_queue(t);
     while (!quit && (r = next_due(t, ebpo_seconds(), wait)) != NULL) {
         ebpo_slot *s = free_slot(t);
+        join_requests(t, r, ebpo_seconds());
         begin_attempt(t, s, r, ebpo_seconds());
-        if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK) {
-            t->active--;
-            s->request = NULL;
-            finish_request(t, r, EBPO_E_IO, "libcurl cannot take another request");
-        }
+        if (curl_multi_add_handle(t->multi, s->easy) != CURLM_OK)
+            finish_slot(t, s, EBPO_E_IO, "libcurl cannot take another request");
     }
     pthread_mutex_unlock(t->lock);
     return !quit;
@@ -800,12 +974,8 @@ static void check_stop(ebpo_transfers *t)
     t->cancelled = true;
     cancel_queue(t);
     for (unsigned i = 0; i < t->slot_count; i++)
-        if (t->slots[i].request) {
-            finish_request(t, t->slots[i].request, EBPO_E_CANCELLED,
-                           "reading was stopped on request");
-            t->slots[i].request = NULL;
-            t->active--;
-        }
+        if (t->slots[i].request)
+            finish_slot(t, &t->slots[i], EBPO_E_CANCELLED, "reading was stopped on request");
     pthread_mutex_unlock(t->lock);
 }
 

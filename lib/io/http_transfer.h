@@ -29,7 +29,7 @@ typedef struct ebpo_request {
     ebpo_http_version version;       /* version of the file, set if `first` is true */
     char type[EBPO_HTTP_TYPE_BYTES]; /* content type of the response */
     /* Private to http_transfer.c. */
-    struct ebpo_request *next; /* next request in the queue */
+    struct ebpo_request *next; /* next request in the queue, or of the same attempt */
     unsigned failures;         /* number of failed attempts */
     double due;                /* time of the next attempt, in seconds of ebpo_seconds */
     double
@@ -58,6 +58,8 @@ void ebpo_transfers_add(ebpo_transfers *transfers, ebpo_request *request, bool u
 void ebpo_transfers_urge(ebpo_transfers *transfers, ebpo_request *request);
 /* Lock held. From now on, refuses responses with another version than `version`. */
 void ebpo_transfers_pin(ebpo_transfers *transfers, const ebpo_http_version *version);
+/* Lock held. Returns true if the server has sent several ranges in one response. */
+bool ebpo_transfers_joins(const ebpo_transfers *transfers);
 /* Lock held. Adds the numbers of requests, retries, connections and bytes to *stats. */
 void ebpo_transfers_add_stats(const ebpo_transfers *transfers, ebpo_http_stats *stats);
 

@@ -70,6 +70,10 @@ lines = {
     "two_ranges": b"HTTP/1.1 206 \r\nContent-Range: bytes 0-9/100\r\nContent-Range: bytes 0-8/100\r\n\r\n",
     "long_tag": b"HTTP/1.1 206 \r\nETag: \"" + b"a" * 250 + b"\"\r\n\r\n",
     "huge": b"HTTP/1.1 206 \r\nContent-Range: bytes 0-9/99999999999999999999\r\n\r\n",
+    "several": b"HTTP/1.1 206 Partial Content\r\nServer: nginx\r\nETag: \"tag\"\r\n"
+               b"Content-Type: multipart/byteranges; boundary=\"mark\"\r\n\r\n\r\n--mark\r\n"
+               b"Content-Range: bytes 0-3/100000\r\n\r\nabcd\r\n--mark\r\n"
+               b"Content-Range: bytes 0-2/100000\r\n\r\nabc\r\n--mark--\r\n",
     "url": b"https://user:pass@word@example.org/a/b?key=1#x",
 }
 for name, text in lines.items():

@@ -6,6 +6,7 @@ of the commands byte by byte. POINTS is the number of query points (default 2000
 """
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -70,7 +71,7 @@ def check(tool, folder, path, ply, points_file, rays, site):
     # All exact queries, with the whole model in memory and with subtrees on demand, from servers
     # with temporary faults.
     for url in (good, f"{site}/short-3/a", f"{site}/random-5-10/b", f"{site}/code_later-503-1-3/c",
-                f"{site}/whole/d"):
+                f"{site}/whole/d", f"{site}/several-0/e", f"{site}/several-4/f"):
         name = url.split("/")[3]
         more = ("--http-retries", "20") if "random" in name else ()
         equal(tool, f"inside {name}", path, url, "inside", points_file, "--raw", *more)
@@ -118,6 +119,14 @@ def check(tool, folder, path, ply, points_file, rays, site):
            and t["requests"] <= 3 + size // (1 << 20), t)
     expect("statistics of local files have reads and bytes",
            set(traffic(tool, "info", path)) == {"reads", "bytes_read"})
+
+    # Few requests to a server that sends several ranges; one more when it does not.
+    for query in ("inside", "distance"):
+        said = [run(tool, query, f"{site}/{fault}/r", points_file, "--raw", "--memory=12MiB",
+                    "--stats").stderr.decode()
+                for fault in ("good", "several-0", "several-4")]
+        alone, several, refused = (int(re.search(r"requests (\d+)", each)[1]) for each in said)
+        expect(f"{query}: several ranges in one request", several <= 0.8 * alone and refused <= alone + 2, said)
 
     # The cache folder.
     cache = os.path.join(folder, "cache")

@@ -454,6 +454,62 @@ class Handler(http.server.BaseHTTPRequestHandler):
                  lambda: self.part(data=self.data[::-1], version=self.version(etag='"v2"'))]
         dice.choice(final if dice.random() < 0.03 else passing)()
 
+    # --- several ranges in one request ---
+
+    def several(self, ranges, data=None, version=None, **changed):
+        """Send several ranges, with one of the faults that fault_several names."""
+        data = self.data if data is None else data
+        mark, total = b"mark", changed.get("total", len(data))
+        body = b"preamble\r\n" if "preamble" in changed else b""
+        for begin, last in ranges:
+            shift = changed.get("shift", 0)
+            body += b"\r\n--%s\r\nContent-Type: application/x-hdf5\r\n" % mark
+            body += b"X-Long: " + b"x" * changed.get("long", 0) + b"\r\n"
+            body += b"X: y\r\n" * changed.get("lines", 0)
+            body += b"Content-Range: bytes %d-%d/%d\r\n\r\n" % (begin + shift, last + shift, total)
+            body += data[begin:last + 1 + changed.get("more", 0)]
+        body += b"\r\n--%s--\r\n" % mark
+        kind = changed.get("kind", 'multipart/byteranges; boundary="mark"')
+        self.head(206, [("Content-Type", kind), ("Content-Length", len(body)), ("Server", "nginx")]
+                  + (self.version() if version is None else version) + changed.get("extra", []))
+        cut = changed.get("cut", 0)
+        self.wfile.write(body[:len(body) - cut])
+        if cut:
+            self.drop()
+
+    def fault_several(self, what=0):
+        """Send several ranges as a server that names itself nginx. `what` is the fault; 0 to 2 are valid."""
+        ranges = [tuple(map(int, each.split("-"))) for each in self.headers["Range"][6:].split(",")]
+        if len(ranges) == 1:
+            new = {"data": self.data[::-1], "version": self.version(etag='"v2"')} if what == 22 and self.number > 1 else {}
+            return self.part(extra=[("Server", "nginx")], **new)
+        found = [lambda: self.several(ranges),
+                 lambda: self.several(ranges, kind="Multipart/Byteranges; boundary=mark"),
+                 lambda: self.several(ranges[::-1]),
+                 lambda: self.several(ranges, cut=150) if self.number == 3 else self.several(ranges),
+                 self.whole,
+                 lambda: self.several(ranges, kind="multipart/byteranges"),
+                 lambda: self.several(ranges, kind="multipart/byteranges; boundary=" + "m" * 99),
+                 lambda: self.several(ranges, kind="multipart/byteranges; boundary=other"),
+                 lambda: self.several(ranges[:1]),
+                 lambda: self.several(ranges[:1] * len(ranges)),
+                 lambda: self.several([(0, 9)] + ranges),
+                 lambda: self.several(ranges, shift=1),
+                 lambda: self.several(ranges, total=len(self.data) - 1),
+                 lambda: self.several(ranges, more=5),
+                 lambda: self.several(ranges, long=5000),
+                 lambda: self.several(ranges, lines=20000),
+                 lambda: self.several(ranges, preamble=True),
+                 lambda: self.several(ranges, extra=[("Content-Encoding", "br")]),
+                 lambda: self.several([(begin, last + 1) for begin, last in ranges]),
+                 lambda: self.several([(ranges[0][0], ranges[-1][1])]),
+                 lambda: self.fail(416),
+                 lambda: self.several(ranges, version=self.version(etag='"v2"')),
+                 lambda: self.several(ranges, data=self.data[::-1], version=self.version(etag='"v2"')),
+                 lambda: self.fail(503) if self.number == 3 else self.several(ranges),
+                 self.drop]
+        found[what]()
+
     # --- ---
 
     def do_GET(self):

@@ -224,6 +224,7 @@ static const struct {
     { "change_size", EBPO_E_IO, "another size" },
     { "change_shorter", EBPO_E_IO, "has changed" },
     { "change_between", EBPO_E_IO, "another ETag" },
+    { "several-22", EBPO_E_IO, "another ETag" },
     { "headers", EBPO_E_IO, "head of the server's response is too long" },
     { "garbage", EBPO_E_IO, "" },
     { "not_satisfiable", EBPO_E_IO, "416" },
@@ -350,6 +351,73 @@ START_TEST(test_http_prefetch_uses_few_requests)
     ck_assert_uint_eq(stats_of(&s).requests, 2);
     ck_assert_uint_eq(stats_of(&s).bytes, HEAD_BYTES + 29 * 98000);
     ck_assert_uint_le(stats_of(&s).connections, 2);
+    s.close(s.user);
+}
+END_TEST
+
+/* Responses to requests for several ranges: faults of faulty_server.py. Requests: the head; the
+ * first range with the first byte; 40 ranges together. If the server fails, each range is requested
+ * alone, and no request is for several ranges again. */
+static const struct {
+    unsigned what, requests, retries;
+} several[] = {
+    { 0, 3, 0 },    /* valid */
+    { 1, 3, 0 },    /* the boundary is not quoted */
+    { 2, 3, 0 },    /* the last part first */
+    { 3, 4, 1 },    /* cut off once: the last range is requested again */
+    { 4, 43, 0 },   /* the whole file */
+    { 5, 43, 0 },   /* no boundary */
+    { 6, 43, 0 },   /* a boundary that is too long */
+    { 7, 43, 0 },   /* another boundary */
+    { 8, 43, 0 },   /* only the first part */
+    { 9, 43, 0 },   /* the first part twice */
+    { 10, 43, 0 },  /* a part that was not requested */
+    { 11, 43, 0 },  /* another offset */
+    { 12, 43, 0 },  /* another size of the file */
+    { 13, 43, 0 },  /* more bytes than Content-Range states */
+    { 14, 43, 0 },  /* a long line */
+    { 15, 43, 0 },  /* many lines */
+    { 16, 43, 0 },  /* text before the first part */
+    { 17, 43, 0 },  /* Content-Encoding */
+    { 18, 43, 0 },  /* longer parts than requested */
+    { 19, 43, 0 },  /* one part for both ranges */
+    { 20, 43, 0 },  /* status 416 */
+    { 21, 43, 0 },  /* another ETag only in responses with several ranges */
+    { 23, 43, 40 }, /* status 503 once: all are requested again, alone */
+    { 24, 43, 1 },  /* a closed connection */
+};
+
+START_TEST(test_http_several_ranges_take_one_request)
+{
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_http_options o = quick();
+    ebpo_source s = EBPO_SOURCE_INIT;
+    ebpo_range ranges[40];
+    char fault[40];
+    snprintf(fault, sizeof fault, "several-%u", several[_i].what);
+    ck_assert_int_eq(ebpo_source_of_url(web_url(fault), &o, &s, &error), EBPO_OK);
+    ck_assert_msg(read_one(&s, 200000, 5000, &error) == EBPO_OK, "%s", error.message);
+    for (uint64_t i = 0; i < 40; i++)
+        ranges[i] = (ebpo_range){ 300000 + i * 60000, 1 + i * 70 };
+    s.prefetch(s.user, ranges, 40);
+    for (int i = 0; i < 40; i++)
+        ck_assert_msg(read_one(&s, ranges[i].offset, ranges[i].size, &error) == EBPO_OK, "%s",
+                      error.message);
+    ebpo_http_stats stats = stats_of(&s);
+    ck_assert_msg(stats.requests == several[_i].requests, "%s: %d requests", fault,
+                  (int)stats.requests);
+    ck_assert_msg(stats.retries == several[_i].retries, "%s: %d retries", fault,
+                  (int)stats.retries);
+    /* once it works, short gaps between ranges are not requested */
+    for (uint64_t i = 0; i < 40; i++)
+        ranges[i] = (ebpo_range){ 2700000 + i * 5000, 100 };
+    s.prefetch(s.user, ranges, 40);
+    for (int i = 0; i < 40; i++)
+        ck_assert_int_eq(read_one(&s, ranges[i].offset, ranges[i].size, &error), EBPO_OK);
+    ebpo_http_stats more = stats_of(&s);
+    ck_assert_uint_eq(more.requests, stats.requests + 1);
+    if (several[_i].requests == 3)
+        ck_assert_uint_lt(more.bytes - stats.bytes, 15000);
     s.close(s.user);
 }
 END_TEST
@@ -784,7 +852,7 @@ static ebpo_verdict judged(const char *const *lines, const ebpo_http_version *pi
                            char why[EBPO_WHY_BYTES])
 {
     ebpo_http_response result = { .code = 0 };
-    ebpo_http_request request = { 100, 200, pinned, 1000, false };
+    ebpo_http_request request = { 100, 200, pinned, 1000, false, false };
     ebpo_status status;
     for (; *lines; lines++)
         ebpo_http_response_line(&result, *lines, strlen(*lines));
@@ -863,8 +931,9 @@ START_TEST(test_http_ranges_beyond_4_gib)
     };
     for (size_t i = 0; i < sizeof results / sizeof *results; i++) {
         ebpo_http_response result = { .code = 0 };
-        ebpo_http_request request = { UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000,
-                                      false };
+        ebpo_http_request request = {
+            UINT64_C(8589934592), UINT64_C(8589934692), &pinned, 1000, false, false
+        };
         ebpo_status status;
         const char *const lines[] = { "HTTP/1.1 206 Partial", "ETag: \"a\"", results[i].line };
         for (int k = 0; k < 3; k++)
@@ -892,7 +961,7 @@ START_TEST(test_http_long_etags_compare_fully)
     ebpo_http_response second = {
         .code = 206, .has_range = true, .has_total = true, .begin = 100, .last = 199, .total = 5000
     };
-    ebpo_http_request request = { 100, 200, &pinned, 1000, false };
+    ebpo_http_request request = { 100, 200, &pinned, 1000, false, false };
     ebpo_status status;
     ebpo_http_response_line(&second, line, sizeof line);
     ck_assert_int_eq(ebpo_http_response_judge(&second, &request, &status, why), EBPO_HTTP_PART);
@@ -933,6 +1002,8 @@ TEST_SUITE(http)
     tcase_add_test(tests, test_http_without_ranges_limits_file_size);
     tcase_add_test(tests, test_http_unversioned_file_is_one_response);
     tcase_add_test(tests, test_http_prefetch_uses_few_requests);
+    tcase_add_loop_test(tests, test_http_several_ranges_take_one_request, 0,
+                        sizeof several / sizeof *several);
     tcase_add_test(tests, test_http_unused_prefetch_hint_is_harmless);
     tcase_add_test(tests, test_http_concurrent_reads);
     tcase_add_test(tests, test_http_faults_never_give_wrong_bytes);
