@@ -583,7 +583,7 @@ static bool is_chosen(const choice *c, const ebpo_array_out *a)
     case SURFACE: return a->id >= EBPO_A_SURFACE_PATCHES && a->id <= EBPO_A_SURFACE_COLOURS;
     case NODES: return in_range && !index && !is_of_faces(a->id);
     case LISTS: return in_range && is_of_faces(a->id);
-    /* query results contain source face indices, which are read together with the faces */
+    /* query results contain source face indices, which are requested together with the faces */
     case MESH:
         return a->id == EBPO_A_VERTICES || a->id == EBPO_A_FACES || a->id == EBPO_A_FACE_SOURCE;
     case MAPS: return a->id == EBPO_A_VERTEX_SOURCE;

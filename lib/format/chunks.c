@@ -3,6 +3,7 @@
  * share a cache, except a counted cache, which belongs to one thread. A counted cache reads and
  * prefetches only requested chunks, and refuses loads beyond a limit of bytes read (EBPO_E_LIMIT).
  */
+#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -94,7 +95,7 @@ static ebpo_status decode_faces(const ebpo_chunks *c, uint64_t chunk, uint64_t r
 static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const uint8_t *raw,
                                    void *xyz, ebpo_error *error)
 {
-    bool finite = true;
+    int finite = true;
     if (c->file->info.double_coordinates) {
         const double *values = xyz;
         ebpo_points64_decode(raw, rows, xyz);
@@ -104,7 +105,7 @@ static ebpo_status decode_vertices(const ebpo_chunks *c, uint64_t rows, const ui
         const float *values = xyz;
         ebpo_points32_decode(raw, rows, xyz);
         for (uint64_t i = 0; i < 3 * rows; i++)
-            finite &= isfinite(values[i]) != 0;
+            finite &= fabsf(values[i]) <= FLT_MAX; /* compilers vectorise this loop */
     }
     return finite ? EBPO_OK
                   : ebpo_chunks_fail(c, -1, EBPO_A_VERTICES, "a coordinate is not a finite number",

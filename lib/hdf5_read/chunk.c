@@ -11,6 +11,7 @@
 
 #include "core/checksum.h"
 #include "core/endian.h"
+#include "core/simd.h"
 #include "hdf5_read/chunk.h"
 
 /* --- shuffle and checksum --- */
@@ -35,7 +36,23 @@ static void unshuffle_two(const uint8_t *in, size_t count, uint8_t *out)
 
 static void unshuffle_four(const uint8_t *in, size_t count, uint8_t *out)
 {
-    for (size_t i = 0; i < count; i++)
+    size_t i = 0;
+#ifdef EBPO_SIMD_SSE2
+    for (; i + 16 <= count; i += 16) { /* 16 elements at a time */
+        __m128i plane[4], pair[4], *to = (void *)(out + 4 * i);
+        for (size_t k = 0; k < 4; k++)
+            plane[k] = _mm_loadu_si128((const void *)(in + k * count + i));
+        pair[0] = _mm_unpacklo_epi8(plane[0], plane[1]); /* bytes 0 and 1 of elements 0 to 7 */
+        pair[1] = _mm_unpacklo_epi8(plane[2], plane[3]);
+        pair[2] = _mm_unpackhi_epi8(plane[0], plane[1]);
+        pair[3] = _mm_unpackhi_epi8(plane[2], plane[3]);
+        for (size_t k = 0; k < 4; k += 2) {
+            _mm_storeu_si128(to + k, _mm_unpacklo_epi16(pair[k], pair[k + 1]));
+            _mm_storeu_si128(to + k + 1, _mm_unpackhi_epi16(pair[k], pair[k + 1]));
+        }
+    }
+#endif
+    for (; i < count; i++)
         ebpo_store32(out + 4 * i, in[i] | (uint32_t)in[count + i] << 8 |
                                       (uint32_t)in[2 * count + i] << 16 |
                                       (uint32_t)in[3 * count + i] << 24);

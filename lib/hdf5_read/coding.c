@@ -24,11 +24,13 @@ void ebpo_points32_encode(const float *xyz, uint64_t rows, uint8_t *file)
 
 void ebpo_points32_decode(const uint8_t *file, uint64_t rows, float *xyz)
 {
-    uint32_t before[3] = { 0, 0, 0 };
-    for (uint64_t i = 0; i < rows * 3; i++) {
-        before[i % 3] += ebpo_unzigzag32(ebpo_load32(file + 4 * i));
-        uint32_t bits = ebpo_float_order32(before[i % 3]);
-        memcpy(&xyz[i], &bits, sizeof bits);
+    typedef uint32_t row4 __attribute__((vector_size(16))); /* a row, and an unused number */
+    row4 before = { 0, 0, 0, 0 };
+    for (uint64_t i = 0; i < rows; i++, file += 12) {
+        row4 code = { ebpo_load32(file), ebpo_load32(file + 4), ebpo_load32(file + 8), 0 };
+        before += (code >> 1) ^ (0 - (code & 1));                           /* ebpo_unzigzag32 */
+        row4 bits = before ^ ((0 - (before >> 31)) & UINT32_C(0x7fffffff)); /* ..._float_order32 */
+        memcpy(&xyz[3 * i], &bits, 12);
     }
 }
 

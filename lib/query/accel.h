@@ -262,11 +262,12 @@ typedef struct ebpo_accel {
     uint32_t bound_count;
     uint32_t root_bound; /* index of the hierarchy's root in `bound` */
     uint32_t shared_count;
-    uint32_t *shared;      /* [shared_count] file indices of the shared faces */
-    uint64_t first_face;   /* file index of the first owned face; the other owned faces have the
-                            * next indices */
-    uint32_t *face_source; /* [face_count] index of each face in the source, the mesh that was
-                            * converted; NULL: the file has no source indices */
+    uint32_t *shared;    /* [shared_count] file indices of the shared faces */
+    uint64_t first_face; /* file index of the first owned face; the other owned faces have the
+                          * next indices */
+    /* [face_count] in a whole model, index of each face in the source, the mesh that was converted;
+     * NULL: a subtree, or the file has no source indices */
+    uint32_t *face_source;
     /* Plane codes of gray nodes; NULL: has_planes is false. The gray node whose children are group
      * g has the codes gray_planes[gray_first[g] .. gray_first[g + 1] - 1]. */
     uint32_t *gray_planes;
@@ -384,18 +385,11 @@ static inline uint64_t ebpo_accel_file_face(const ebpo_accel *s, uint32_t local)
     return local < s->shared_count ? s->shared[local] : s->first_face + (local - s->shared_count);
 }
 
-/* Prefetches into the processor's cache the value that ebpo_accel_source_face will read. */
+/* Prefetches into the processor's cache the value that ebpo_model_source_face will read. */
 static inline void ebpo_accel_fetch_face(const ebpo_accel *s, uint32_t local)
 {
     if (s->face_source)
         __builtin_prefetch(&s->face_source[local]);
-}
-
-/* Returns the face's index in the source. If the file has no source indices, returns the index in
- * the file. */
-static inline uint64_t ebpo_accel_source_face(const ebpo_accel *s, uint32_t local)
-{
-    return s->face_source ? s->face_source[local] : ebpo_accel_file_face(s, local);
 }
 
 #endif

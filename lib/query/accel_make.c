@@ -97,7 +97,7 @@ static sizes sizes_of(const counts *c, const ebpo_info *info)
     return (sizes){
         .levels = 3 * c->groups + 20 * c->leaves + 4 * (c->uniform + c->refs + c->planes),
         .mesh = 12 * c->faces + 3 * coordinate * c->vertices,
-        .maps = maps * c->faces,
+        .maps = c->is_subtree ? 0 : maps * c->faces,
         .shared = 4 * c->shared,
         .only_read = c->is_subtree ? older_vertices_bytes(c)
                                    : maps * c->vertices + c->leaves + 4 * c->leaf_planes,
@@ -639,12 +639,11 @@ static void join_arrays(ebpo_accel *s, const ebpo_quota *space)
              cylinders = s->bound_count * (uint64_t)sizeof *s->cylinder,
              list = s->list_count * sizeof *s->list, leaves = s->leaf_count * sizeof *s->leaf,
              shared = (uint64_t)s->shared_count * sizeof *s->shared,
-             source = s->face_source ? (uint64_t)s->face_count * sizeof *s->face_source : 0,
              first = s->gray_first ? (s->gray_count + 1) * sizeof *s->gray_first : 0,
              planes = s->gray_first
                           ? s->gray_first[s->gray_count] * (uint64_t)sizeof *s->gray_planes
                           : 0,
-             all = meshlets + bounds + cylinders + list + leaves + shared + source + first + planes;
+             all = meshlets + bounds + cylinders + list + leaves + shared + first + planes;
     all = (all + EBPO_MESHLET_UNIT - 1) / EBPO_MESHLET_UNIT * EBPO_MESHLET_UNIT;
     s->arrays =
         !space || s->bytes + all > space->most ? NULL : aligned_alloc(EBPO_MESHLET_UNIT, all);
@@ -658,7 +657,6 @@ static void join_arrays(ebpo_accel *s, const ebpo_quota *space)
     s->list = move_array(&to, (void *)s->list, list);
     s->leaf = move_array(&to, s->leaf, leaves);
     s->shared = move_array(&to, s->shared, shared);
-    s->face_source = move_array(&to, s->face_source, source);
     s->gray_first = move_array(&to, s->gray_first, first);
     s->gray_planes = move_array(&to, s->gray_planes, planes);
 }
@@ -726,10 +724,10 @@ void ebpo_accel_free(ebpo_accel *s)
         free(s->bound);
         free(s->cylinder);
         free(s->shared);
-        free(s->face_source);
         free(s->gray_planes);
         free(s->gray_first);
     }
+    free(s->face_source);
     free(s->arrays);
     free(s);
 }

@@ -79,7 +79,7 @@ static ebpo_status distance_around(ebpo_context *c, const double p[3],
     else if (status == EBPO_OK && o->mode == EBPO_DISTANCE_RECURSIVE)
         status = search_leaves(c, &n, gray, error);
     if (status == EBPO_OK)
-        ebpo_nearest_end(&n, o->max_distance, out);
+        status = ebpo_nearest_end(&n, c->model, o->max_distance, out, error);
     out->lo = 0; /* the result may not be the minimum: it is only an upper bound */
     return status == EBPO_OK ? ebpo_give_sign(c, p, o, out, error) : status;
 }
@@ -286,8 +286,7 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     if (o->warm && c->warm && c->model->whole)
         ebpo_nearest_begin_at(&n, c->warm_block, c->warm_node);
     else if (o->warm && c->warm)
-        ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face,
-                                c->warm_source_face);
+        ebpo_nearest_begin_with(&n, (const double(*)[3])c->warm_triangle, c->warm_face);
     ebpo_status status = ebpo_nearest_first(c, &n, error);
     if (status == EBPO_OK)
         status = inspect_pruned(c, &n, error);
@@ -303,7 +302,9 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
         prefetch_around(c, p, hi);
         return EBPO_OK;
     }
-    ebpo_nearest_end(&n, o->max_distance, out);
+    status = ebpo_nearest_end(&n, c->model, o->max_distance, out, error);
+    if (status != EBPO_OK)
+        return status;
     prefetch_around(c, p, out->face == EBPO_NO_FACE ? o->max_distance : out->distance);
     if (out->face == EBPO_NO_FACE)
         return EBPO_OK;
@@ -311,7 +312,6 @@ static ebpo_status exact_distance(ebpo_context *c, const double p[3],
     c->warm_block = n.block;
     c->warm_node = n.node;
     c->warm_face = n.file_face;
-    c->warm_source_face = n.source_face;
     memcpy(c->warm_triangle, n.triangle, sizeof n.triangle);
     return ebpo_give_sign(c, p, o, out, error);
 }

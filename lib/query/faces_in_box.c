@@ -240,14 +240,9 @@ static bool box_walk_is_first(const box_walk *w, bool owned, const double triang
 
 /* --- indices of faces --- */
 
-/* A face: its index in the file and in the source (the index that callers get). */
-typedef struct pair {
-    uint64_t file_face, source_face;
-} pair;
-
 typedef struct gathering {
-    box_walk walk; /* must be the first member */
-    pair *list;
+    box_walk walk;  /* must be the first member */
+    uint64_t *list; /* [count] indices in the file */
     uint64_t count, capacity;
 } gathering;
 
@@ -257,18 +252,15 @@ static ebpo_status receive_face_indices(box_walk *walk, const ebpo_accel *s, ebp
     gathering *g = (gathering *)walk;
     if (!ebpo_grow(&g->list, &g->capacity, g->count + walk->count, sizeof *g->list))
         return ebpo_fail_memory(error, (g->count + walk->count) * sizeof *g->list);
-    for (uint64_t i = 0; i < walk->count; i++) {
-        uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
-        g->list[g->count++] =
-            (pair){ ebpo_accel_file_face(s, local), ebpo_accel_source_face(s, local) };
-    }
+    for (uint64_t i = 0; i < walk->count; i++)
+        g->list[g->count++] = ebpo_accel_file_face(s, ebpo_accel_slot_face(s, walk->slot[i]));
     return EBPO_OK;
 }
 
-static int compare_pairs(const void *a, const void *b)
+static int compare_indices(const void *a, const void *b)
 {
-    const pair *x = a, *y = b;
-    return (x->file_face > y->file_face) - (x->file_face < y->file_face);
+    uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+    return (x > y) - (x < y);
 }
 
 /* Sorts the found faces, removes repetitions, and stores the source indices in the context. */
@@ -279,13 +271,15 @@ static ebpo_status finish_faces(gathering *g, const uint64_t **faces, uint64_t *
     if (!ebpo_grow(&c->faces, &c->face_capacity, g->count, sizeof *c->faces))
         return ebpo_fail_memory(error, g->count * sizeof *g->list);
     if (g->count)
-        qsort(g->list, g->count, sizeof *g->list, compare_pairs);
-    for (uint64_t i = 0; i < g->count; i++)
+        qsort(g->list, g->count, sizeof *g->list, compare_indices);
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < g->count && status == EBPO_OK; i++)
         /* a face that several subtrees list occurs several times in g->list */
-        if (i == 0 || g->list[i].file_face != g->list[i - 1].file_face)
-            c->faces[(*count)++] = g->list[i].source_face;
-    *faces = c->faces;
-    return EBPO_OK;
+        if (i == 0 || g->list[i] != g->list[i - 1])
+            status = ebpo_model_source_face(c->model, g->list[i], &c->faces[(*count)++], error);
+    *faces = status == EBPO_OK ? c->faces : NULL;
+    *count = status == EBPO_OK ? *count : 0;
+    return status;
 }
 
 ebpo_status ebpo_faces_in_box(ebpo_context *context, const double min[3], const double max[3],
@@ -343,19 +337,21 @@ static void pass_batch(delivery *d)
 static ebpo_status receive_triangles(box_walk *walk, const ebpo_accel *s, ebpo_error *error)
 {
     delivery *d = (delivery *)walk;
-    (void)error;
-    for (uint64_t i = 0; i < walk->count && !walk->enough; i++) {
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < walk->count && !walk->enough && status == EBPO_OK; i++) {
         uint32_t local = ebpo_accel_slot_face(s, walk->slot[i]);
         double(*corners)[3] = d->batch->corners[d->count];
         ebpo_accel_triangle(s, walk->slot[i], corners);
         if (!box_walk_is_first(walk, local >= s->shared_count, (const double(*)[3])corners))
             continue;
-        d->batch->faces[d->count] = ebpo_accel_source_face(s, local);
-        d->batch->file_faces[d->count++] = ebpo_accel_file_face(s, local);
-        if (d->count == EBPO_TRIANGLES_MAX)
+        uint64_t file_face = ebpo_accel_file_face(s, local);
+        status = ebpo_model_source_face(walk->context->model, file_face, &d->batch->faces[d->count],
+                                        error);
+        d->batch->file_faces[d->count++] = file_face;
+        if (status == EBPO_OK && d->count == EBPO_TRIANGLES_MAX)
             pass_batch(d);
     }
-    return EBPO_OK;
+    return status;
 }
 
 ebpo_status ebpo_triangles_in_box(ebpo_context *context, const double min[3], const double max[3],

@@ -923,7 +923,7 @@ static ebpo_status leaf_from_file(inside_query *query, const ebpo_node *leaf,
     ebpo_accel *subtree = NULL;
     ebpo_status status = ebpo_model_has_capacity(m, leaf, error);
     if (status == EBPO_OK)
-        status = ebpo_slice_read(&slice, m->chunks, leaf, error);
+        status = ebpo_slice_read_parts(&slice, m->chunks, leaf, ebpo_subtree_needs(false), error);
     if (status == EBPO_OK)
         status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
     if (status == EBPO_OK && m->holes)

@@ -116,7 +116,8 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
     for (uint64_t i = 0; needed && i < count; i++)
         if (!ebpo_cache_has(m->cache, ebpo_context_key(c, below[i])))
             needed[absent++] = below[i];
-    ebpo_top_hint(m->top, m->chunks, needed, absent, ebpo_subtree_needs(c->planes));
+    ebpo_top_hint(m->top, m->chunks, needed, absent,
+                  ebpo_subtree_needs(c->planes) | EBPO_NEEDS_MAPS); /* MAPS: for results */
     free(needed);
 }
 

@@ -84,14 +84,13 @@ void ebpo_nearest_begin(ebpo_nearest *n, const ebpo_model *model, const double p
 /* Makes a face the nearest face so far, and lowers the limits of the search. */
 static void set_nearest_face(ebpo_nearest *n, const double triangle[3][3],
                              const ebpo_distance_bounds *bounds, const ebpo_far_keys *keys,
-                             uint64_t file_face, uint64_t source_face)
+                             uint64_t file_face)
 {
     n->found = true;
     n->bounds = *bounds;
     n->keys = *keys;
     n->key_limit = fmin(n->key_limit, keys->hi);
     n->file_face = file_face;
-    n->source_face = source_face;
     memcpy(n->triangle, triangle, sizeof n->triangle);
     n->upper = fmin(n->upper, bounds->hi);
     n->limit = fmin(n->limit, bounds->hi);
@@ -114,14 +113,13 @@ static int compare_with_nearest(const ebpo_nearest *n, const double triangle[3][
     return ebpo_near_compare(n->p, triangle, b, (const double(*)[3])n->triangle, &n->bounds);
 }
 
-void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
-                             uint64_t source_face)
+void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face)
 {
     ebpo_distance_bounds b;
     ebpo_far_keys keys = keys_of(n, triangle);
     ebpo_triangle_distance_bounds(n->p, (const double(*)[3])triangle, &b);
     if (b.lo <= n->limit && keys.lo <= n->key_limit)
-        set_nearest_face(n, triangle, &b, &keys, file_face, source_face);
+        set_nearest_face(n, triangle, &b, &keys, file_face);
 }
 
 /* Tests a face. If the face is the nearest so far, keeps it and returns true. */
@@ -147,8 +145,7 @@ static bool try_face(ebpo_nearest *n, const ebpo_accel *s, uint32_t slot)
         if (sign > 0 || (sign == 0 && file_face > n->file_face))
             return false;
     }
-    set_nearest_face(n, (const double(*)[3])triangle, &b, &keys, file_face,
-                     ebpo_accel_source_face(s, local));
+    set_nearest_face(n, (const double(*)[3])triangle, &b, &keys, file_face);
     return true;
 }
 
@@ -385,18 +382,19 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
         search_far(n, s, s->root_bound);
 }
 
-void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out)
+ebpo_status ebpo_nearest_end(const ebpo_nearest *n, const ebpo_model *model, double max_distance,
+                             ebpo_distance_result *out, ebpo_error *error)
 {
     *out = (ebpo_distance_result){ INFINITY,          max_distance, INFINITY,
                                    { NAN, NAN, NAN }, { 0, 0, 0 },  EBPO_NO_FACE };
     if (!n->found || (n->bounds.hi > max_distance &&
                       ebpo_triangle_distance_compare_to(n->p, (const double(*)[3])n->triangle,
                                                         max_distance) > 0))
-        return;
+        return EBPO_OK;
     ebpo_triangle_nearest exact;
     ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds, out->normal,
                                 &exact);
     out->distance = out->lo = out->hi = exact.distance;
     memcpy(out->point, exact.point, sizeof out->point);
-    out->face = n->source_face;
+    return ebpo_model_source_face(model, n->file_face, &out->face, error);
 }

@@ -23,10 +23,10 @@ typedef struct ebpo_nearest {
     double limit;     /* faces that are farther away are certainly not the result */
     double upper;     /* upper bound of the distance to the model's nearest face, or INFINITY */
     bool found;       /* there is a winner; the fields `bounds` to `node` are valid */
-    ebpo_distance_bounds bounds;     /* bounds of the winner's distance */
-    ebpo_far_keys keys;              /* for a far point: bounds of the winner's key */
-    double triangle[3][3];           /* corners of the winner */
-    uint64_t file_face, source_face; /* index of the winner in the file, and in the source */
+    ebpo_distance_bounds bounds; /* bounds of the winner's distance */
+    ebpo_far_keys keys;          /* for a far point: bounds of the winner's key */
+    double triangle[3][3];       /* corners of the winner */
+    uint64_t file_face;          /* index of the winner in the file */
     uint32_t block, node; /* block of the winner, and the node above the block; EBPO_NO_BLOCK: the
                            * winner was known before the search */
     uint32_t first_block, first_node; /* block and node where a search starts, or EBPO_NO_BLOCK */
@@ -61,8 +61,7 @@ static inline bool ebpo_nearest_is_late(ebpo_nearest *n)
 }
 
 /* Makes a known face of the model the winner, if it is within the limit. */
-void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face,
-                             uint64_t source_face);
+void ebpo_nearest_begin_with(ebpo_nearest *n, const double triangle[3][3], uint64_t file_face);
 
 /* Sets the block where the search starts, and the node above it. Only one accel may then be
  * searched: the accel of this block. */
@@ -79,7 +78,9 @@ void ebpo_nearest_search(ebpo_nearest *n, const ebpo_context *context, const ebp
 void ebpo_nearest_leaf(ebpo_nearest *n, const ebpo_accel *s, const ebpo_accel_leaf *leaf);
 
 /* Writes the result, without sign. If no face is within max_distance, the distance is INFINITY. */
-void ebpo_nearest_end(const ebpo_nearest *n, double max_distance, ebpo_distance_result *out);
+EBPO_MUST_USE ebpo_status ebpo_nearest_end(const ebpo_nearest *n, const ebpo_model *model,
+                                           double max_distance, ebpo_distance_result *out,
+                                           ebpo_error *error);
 
 /* --- a context's queue ---
  *

@@ -164,14 +164,17 @@ static void kept_envelopes_free(ebpo_kept_envelopes *k)
 /* --- subtrees for the cache --- */
 
 /* Estimates the bytes of a subtree for the cache: the most bytes while it is loaded (*peak), and
- * the bytes that it keeps (*keep). */
+ * the bytes that it keeps (*keep). Before that, sends prefetch hints for all data of the subtree of
+ * a remote file, and for the source indices of its faces, which may be in results. */
 static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                                     ebpo_error *error)
 {
     ebpo_model *m = user;
     ebpo_slice_size size;
+    uint32_t below = (uint32_t)(key >> 1);
+    ebpo_top_hint(m->top, m->chunks, &below, 1, ebpo_subtree_needs(key & 1) | EBPO_NEEDS_MAPS);
     ebpo_status status =
-        ebpo_slice_measure_nodes(m->chunks, &m->top->below[key >> 1], ebpo_subtree_needs(key & 1),
+        ebpo_slice_measure_nodes(m->chunks, &m->top->below[below], ebpo_subtree_needs(key & 1),
                                  EBPO_SLICE_ALL, &size, error);
     if (status == EBPO_OK)
         ebpo_accel_estimate_subtree(&size, m->info, keep, peak);
@@ -591,6 +594,17 @@ static ebpo_status fail_limit(const ebpo_model *m, uint32_t below, ebpo_error *e
                      m->options.memory, m->top->cut_level, least);
 }
 
+ebpo_status ebpo_model_read_source_face(const ebpo_model *m, uint64_t file_face, uint64_t *out,
+                                        ebpo_error *error)
+{
+    ebpo_held_chunk view = { .array = ebpo_reader_array(m->file, EBPO_A_FACE_SOURCE, 0) };
+    ebpo_status status = ebpo_held_chunk_move(m->chunks, &view, file_face, error);
+    if (status == EBPO_OK)
+        *out = ((const uint32_t *)(const void *)view.rows)[file_face - view.begin];
+    ebpo_held_chunk_release(m->chunks, &view);
+    return status;
+}
+
 ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **out,
                                  ebpo_error *error)
 {
@@ -604,11 +618,6 @@ ebpo_status ebpo_context_subtree(ebpo_context *c, uint32_t below, ebpo_accel **o
     if (m->options.loading != EBPO_LOAD_CACHE)
         ebpo_cache_clear(m->cache);
     uint64_t key = ebpo_context_key(c, below);
-    const ebpo_node *root = &m->top->below[below];
-    /* a subtree of the file needs no hint here, because its load sends one */
-    bool is_of_file = root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level;
-    if (ebpo_input_prefetches(&m->file->in) && !is_of_file && !ebpo_cache_has(m->cache, key))
-        ebpo_top_hint(m->top, m->chunks, &below, 1, ebpo_subtree_needs(c->planes));
     bool hit = true;
     ebpo_status status = ebpo_cache_get(m->cache, key, &item, &hit, error);
     c->loaded += !hit;

@@ -28,7 +28,7 @@
 typedef struct near_face {
     const double *p; /* the query point */
     ebpo_distance_bounds bounds;
-    uint64_t file_face, source_face;
+    uint64_t file_face; /* index in the file */
     double triangle[3][3];
 } near_face;
 
@@ -120,7 +120,6 @@ static void try_face(near_band *band, const ebpo_accel *s, uint32_t slot)
         return;
     face.p = band->p;
     face.file_face = ebpo_accel_file_face(s, local);
-    face.source_face = ebpo_accel_source_face(s, local);
     if (band->has_after && compare_faces(&face, &band->after) <= 0)
         return;
     if (face.bounds.hi > band->radius &&
@@ -357,33 +356,36 @@ static ebpo_status search_band(within *w, uint64_t faces_max, ebpo_error *error)
     return ebpo_check_pruned(w->context, node_matters, w, error);
 }
 
-/* Passes a face to the caller. Returns false if the caller wants no more faces. */
-static bool give_face(within *w, const near_face *n)
+/* Passes a face to the caller. Sets *more to false if the caller wants no more faces. */
+static ebpo_status give_face(within *w, const near_face *n, bool *more, ebpo_error *error)
 {
     ebpo_triangle_nearest exact;
-    ebpo_near_face out = { .normal = { NAN, NAN, NAN },
-                           .face = n->source_face,
-                           .file_face = n->file_face };
+    ebpo_near_face out = { .normal = { NAN, NAN, NAN }, .file_face = n->file_face };
+    ebpo_status status = ebpo_model_source_face(w->context->model, n->file_face, &out.face, error);
+    if (status != EBPO_OK)
+        return status;
     ebpo_triangle_nearest_exact(n->p, (const double(*)[3])n->triangle, &n->bounds,
                                 w->options->normals ? out.normal : NULL, &exact);
     out.distance = exact.distance;
     memcpy(out.point, exact.point, sizeof out.point);
     w->given++;
-    return w->take(w->user, &out);
+    *more = w->take(w->user, &out);
+    return EBPO_OK;
 }
 
-/* Passes the band's faces to the caller. Returns true if there may be another band that the caller
- * wants. */
-static bool give_band(within *w)
+/* Passes the band's faces to the caller. Sets *more to true if there may be another band that the
+ * caller wants. */
+static ebpo_status give_band(within *w, bool *more, ebpo_error *error)
 {
-    for (uint64_t i = 0; i < w->band.count; i++)
-        if (!give_face(w, &w->band.near[i]))
-            return false;
-    if (!w->band.cut)
-        return false;
-    w->band.has_after = true;
-    w->band.after = w->band.near[w->band.count - 1];
-    return true;
+    ebpo_status status = EBPO_OK;
+    *more = true;
+    for (uint64_t i = 0; i < w->band.count && *more && status == EBPO_OK; i++)
+        status = give_face(w, &w->band.near[i], more, error);
+    *more = *more && w->band.cut;
+    w->band.has_after = *more;
+    if (*more)
+        w->band.after = w->band.near[w->band.count - 1];
+    return status;
 }
 
 static ebpo_status stream_faces(within *w, ebpo_error *error)
@@ -395,7 +397,8 @@ static ebpo_status stream_faces(within *w, ebpo_error *error)
     while (more && w->given < wanted && status == EBPO_OK) {
         uint64_t missing = wanted - w->given;
         status = search_band(w, missing < band_size ? missing : band_size, error);
-        more = status == EBPO_OK && give_band(w);
+        if (status == EBPO_OK)
+            status = give_band(w, &more, error);
         band_size = band_size < BAND_MAX / BAND_GROWTH ? band_size * BAND_GROWTH : BAND_MAX;
     }
     return status;

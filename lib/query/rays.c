@@ -30,7 +30,7 @@
 /* A face that the ray hits, with the data for an exact comparison with other hits. */
 struct ebpo_ray_found {
     double triangle[3][3];
-    uint64_t file_face, source_face;
+    uint64_t file_face; /* index in the file */
     ebpo_ray_intersection intersection;
     /* Hits with the same number are in one corner or edge, so at the same t. 0: any other hit. */
     unsigned shared;
@@ -95,9 +95,11 @@ static inline void casting_begin(casting *c, ebpo_context *context, const double
     c->capacity = &context->found_capacity;
 }
 
-static inline ebpo_ray_hit hit_of(const ebpo_ray_found *m)
+static inline ebpo_status give_hit(const casting *c, const ebpo_ray_found *m, ebpo_ray_hit *out,
+                                   ebpo_error *error)
 {
-    return (ebpo_ray_hit){ m->intersection.t, m->source_face, m->intersection.side };
+    *out = (ebpo_ray_hit){ m->intersection.t, EBPO_NO_FACE, m->intersection.side };
+    return ebpo_model_source_face(c->context->model, m->file_face, &out->face, error);
 }
 
 /* --- one ray through one accel: limits --- */
@@ -362,11 +364,12 @@ static ebpo_status casting_sort(casting *c, uint64_t begin, uint64_t *end, ebpo_
         return ebpo_fail_memory(error, (begin + c->count) * sizeof *k->hits);
     const ebpo_ray_found *found = *c->found;
     sort_found(*c->found, c->count, &c->ray);
-    for (uint64_t i = 0; i < c->count; i++)
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < c->count && status == EBPO_OK; i++)
         /* A face that several subtrees list may be hit several times. */
         if (i == 0 || found[i].file_face != found[i - 1].file_face)
-            k->hits[(*end)++] = hit_of(&found[i]);
-    return EBPO_OK;
+            status = give_hit(c, &found[i], &k->hits[(*end)++], error);
+    return status;
 }
 
 /* Returns the same as ray_fault, more slowly. */
@@ -426,7 +429,6 @@ static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
     if (!casting_intersects(c, facing, &m))
         return;
     m.file_face = ebpo_accel_file_face(r->s, local);
-    m.source_face = ebpo_accel_source_face(r->s, local);
     casting_keep(c, &m);
     r->done = c->done;
     r->limit = c->limit;
@@ -594,9 +596,9 @@ ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const 
     EBPO_DEFAULT_FP;
     casting c;
     ebpo_status status = cast_ray(&c, context, origin, direction, t_max, EBPO_WANTS_FIRST, error);
+    if (status == EBPO_OK && c.count)
+        status = give_hit(&c, &c.first, out, error);
     *hit = status == EBPO_OK && c.count;
-    if (*hit)
-        *out = hit_of(&c.first);
     return status;
 }
 
@@ -686,8 +688,12 @@ static ebpo_status store_result(batch *b, uint64_t i, unsigned worker, casting *
 {
     ebpo_status status = EBPO_OK;
     if (b->wants == EBPO_WANTS_FIRST) {
-        store_first(b, i, c->count ? hit_of(&c->first) : no_hit);
-        return EBPO_OK;
+        ebpo_ray_hit hit = no_hit;
+        if (c->count)
+            status = give_hit(c, &c->first, &hit, error);
+        if (status == EBPO_OK)
+            store_first(b, i, hit);
+        return status;
     }
     if (b->wants == EBPO_WANTS_ANY)
         b->any[i] = c->count;
@@ -798,6 +804,7 @@ typedef struct four {
 static ebpo_status end_four(group *g, four *f, ebpo_error *error)
 {
     const ebpo_accel *s = g->rays.s;
+    const ebpo_model *m = g->b->context[g->worker]->model;
     ebpo_status status = EBPO_OK;
     ebpo_ray_four in;
     double t[4];
@@ -817,11 +824,14 @@ static ebpo_status end_four(group *g, four *f, ebpo_error *error)
     }
     unsigned done = ebpo_ray_interior_four(&in, t);
     for (unsigned i = 0; i < f->count && status == EBPO_OK; i++) {
-        uint64_t face = ebpo_accel_source_face(s, ebpo_accel_slot_face(s, f->candidate[i].slot));
-        if (done >> i & 1)
-            store_first(g->b, g->index[f->ray[i]], (ebpo_ray_hit){ t[i], face, in.facing[i] });
-        else
+        ebpo_ray_hit hit = { t[i], EBPO_NO_FACE, in.facing[i] };
+        if (done >> i & 1) {
+            uint32_t face = ebpo_accel_slot_face(s, f->candidate[i].slot);
+            status = ebpo_model_source_face(m, face, &hit.face, error);
+            store_first(g->b, g->index[f->ray[i]], hit);
+        } else {
             status = end_ray(g, f->ray[i], error);
+        }
     }
     f->count = 0;
     return status;

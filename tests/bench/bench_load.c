@@ -1,7 +1,8 @@
 /* Measures the cost of loading by stage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N]
- * [--planes] [--whole]. Without --whole it loads N subtrees below the cut level, one after another
- * from the middle of the file, as queries under a budget do. With --whole it loads the whole model
- * N times, on one thread. Prints the CPU time of this thread. */
+ * [--planes] [--scattered] [--whole]. Without --whole it loads N subtrees below the cut level, as
+ * queries under a budget do: one after another from the middle of the file, or with --scattered in
+ * an order without neighbours. Prints how many chunks a load decodes. With --whole it loads the
+ * whole model N times, on one thread. Prints the CPU time of this thread. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,20 +45,28 @@ static void make_and_free(stages *t, ebpo_slice *slice, const ebpo_info *info, b
     t->release += now() - made;
 }
 
-static void load_below(stages *t, ebpo_model *m, uint64_t count, bool planes)
+static void load_below(stages *t, ebpo_model *m, uint64_t count, bool planes, bool scattered)
 {
+    enum { FAR = 10007 }; /* a prime, so that every subtree has its turn */
     ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_cache_stats before, after;
     uint64_t first = m->top->below_count > count ? (m->top->below_count - count) / 2 : 0;
+    ebpo_chunks_get_stats(m->chunks, &before);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_slice slice;
         double begin = now();
-        check(ebpo_slice_read_parts(&slice, m->chunks,
-                                    &m->top->below[(first + i) % m->top->below_count],
-                                    ebpo_subtree_needs(planes), &error),
+        check(ebpo_slice_read_parts(
+                  &slice, m->chunks,
+                  &m->top->below[(first + i * (scattered ? FAR : 1)) % m->top->below_count],
+                  ebpo_subtree_needs(planes), &error),
               &error);
         t->read += now() - begin;
         make_and_free(t, &slice, m->info, planes);
     }
+    ebpo_chunks_get_stats(m->chunks, &after);
+    printf("%.1f chunks decoded in a load, %.1f found\n",
+           (double)(after.loads - before.loads) / (double)count,
+           (double)(after.hits - before.hits) / (double)count);
 }
 
 static void load_whole(stages *t, const ebpo_file *file, uint64_t count, bool planes)
@@ -75,10 +84,12 @@ static void load_whole(stages *t, const ebpo_file *file, uint64_t count, bool pl
 int main(int argc, char **argv)
 {
     uint64_t count = 0, memory = UINT64_C(256) << 20;
-    bool planes = false, whole = false;
+    bool planes = false, whole = false, scattered = false;
     for (int i = 2; i < argc; i++)
         if (strcmp(argv[i], "--planes") == 0)
             planes = true;
+        else if (strcmp(argv[i], "--scattered") == 0)
+            scattered = true;
         else if (strcmp(argv[i], "--whole") == 0)
             whole = true;
         else if (strcmp(argv[i], "--memory") == 0 && i + 1 < argc)
@@ -87,7 +98,7 @@ int main(int argc, char **argv)
             count = strtoull(argv[++i], NULL, 10);
     if (argc < 2) {
         fprintf(stderr, "usage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N] [--planes] "
-                        "[--whole]\n");
+                        "[--scattered] [--whole]\n");
         return 2;
     }
     ebpo_error error = EBPO_ERROR_INIT;
@@ -107,7 +118,7 @@ int main(int argc, char **argv)
                             "smaller --memory\n");
             return EXIT_FAILURE;
         }
-        load_below(&t, m, count, planes);
+        load_below(&t, m, count, planes, scattered);
         ebpo_model_free(m);
     }
     ebpo_close(file);

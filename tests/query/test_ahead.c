@@ -1,4 +1,5 @@
-/* Prefetching of subtrees: the subtrees needed by queries nearby are among the prefetched ones. */
+/* Prefetching of subtrees: the subtrees needed by queries nearby are among the prefetched ones.
+ * Also what a load does not decode. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -125,6 +126,51 @@ START_TEST(test_prefetch_orders_nearest_first)
 }
 END_TEST
 
+/* Returns the number of chunks of source indices that are not decoded. */
+static unsigned missing_sources(const ebpo_model *model, ebpo_chunk_keys *keys)
+{
+    ebpo_chunk_keys_begin(keys);
+    (void)ebpo_chunks_missing(model->chunks, EBPO_A_FACE_SOURCE, 0, 0, model->info->face_count,
+                              keys);
+    return keys->count;
+}
+
+START_TEST(test_loads_decode_no_source_indices)
+{
+    query_model m;
+    ebpo_model *model;
+    ebpo_context *context;
+    ebpo_ray_hit hit;
+    bool found = false;
+    ebpo_model_options how = EBPO_MODEL_OPTIONS_INIT;
+    ebpo_distance_options options = EBPO_DISTANCE_OPTIONS_INIT;
+    ebpo_distance_result distance;
+    ebpo_chunk_keys *keys = query_alloc(1, sizeof *keys);
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    how.memory = UINT64_C(1) << 40;
+    how.cut_level = 2;
+    ASSERT_OK(ebpo_model_new(m.file, &how, &model, error));
+    unsigned all = missing_sources(model, keys);
+    for (uint64_t i = 0; i < model->top->below_count; i++)
+        load(model, &i, 1);
+    ck_assert_uint_gt(all, 0);
+    ck_assert_uint_eq(missing_sources(model, keys), all);
+    double p[3], direction[3] = { 1, 0.25, 0.125 };
+    for (int k = 0; k < 3; k++)
+        p[k] = m.info.box_origin[k] + m.info.box_size[k] / 2;
+    ASSERT_OK(ebpo_context_new(model, &context, error));
+    ASSERT_OK(ebpo_distance(context, p, &options, &distance, error));
+    ck_assert_uint_eq(missing_sources(model, keys), all - 1);
+    ASSERT_OK(ebpo_ray_first(context, p, direction, INFINITY, &hit, &found, error));
+    ck_assert(found);
+    ck_assert_uint_ge(missing_sources(model, keys) + 2, all);
+    ebpo_context_free(context);
+    ebpo_model_free(model);
+    query_model_free(&m);
+    free(keys);
+}
+END_TEST
+
 TEST_SUITE(ahead)
 {
     Suite *suite = suite_create("ahead");
@@ -132,6 +178,7 @@ TEST_SUITE(ahead)
     tcase_set_timeout(tests, 1000);
     tcase_add_loop_test(tests, test_prefetch_covers_nearby_queries, 0, CASES);
     tcase_add_loop_test(tests, test_prefetch_orders_nearest_first, 0, CASES);
+    tcase_add_test(tests, test_loads_decode_no_source_indices);
     suite_add_tcase(suite, tests);
     return suite;
 }

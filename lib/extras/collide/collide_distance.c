@@ -31,9 +31,9 @@
 
 /* Two faces, one of each model. */
 typedef struct ebpo_face_two {
-    uint64_t file[2], source[2]; /* face indices in the file and in the source */
-    double unposed[2][3][3];     /* corners as in the files */
-    double corner[2][3][3];      /* corners at the poses */
+    uint64_t file[2];        /* face indices in the files */
+    double unposed[2][3][3]; /* corners as in the files */
+    double corner[2][3][3];  /* corners at the poses */
     ebpo_pair_distance_bounds bounds;
 } ebpo_face_two;
 
@@ -81,7 +81,6 @@ static void inspect_slots(const ebpo_gap_search *g, const uint32_t slot[2], ebpo
     for (int s = 0; s < 2; s++) {
         uint32_t local = ebpo_accel_slot_face(g->accel[s], slot[s]);
         out->file[s] = ebpo_accel_file_face(g->accel[s], local);
-        out->source[s] = ebpo_accel_source_face(g->accel[s], local);
         ebpo_accel_triangle(g->accel[s], slot[s], out->unposed[s]);
     }
     pose_faces(posing, out);
@@ -523,7 +522,7 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n,
         set_common_point(f, kind, point);
     }
     out->pair =
-        (ebpo_face_pair){ f->source[a], f->source[b], f->file[a], f->file[b], (int32_t)kind, 0 };
+        (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, f->file[a], f->file[b], (int32_t)kind, 0 };
     for (int k = 0; k < 3; k++) {
         out->point_a[k] = point[a][k];
         out->point_b[k] = point[b][k];
@@ -533,13 +532,12 @@ static void report_pair(const ebpo_collision *q, const nearest_pair *n,
 /* --- from one query to the next --- */
 
 /* Converts a pair between the caller's order and the query's order of the models: returns the pair
- * with its faces exchanged if both orders differ. Only file, source and unposed are exchanged. */
+ * with its faces exchanged if both orders differ. Only file and unposed are exchanged. */
 static ebpo_face_two in_query_order(const ebpo_collision *q, const ebpo_face_two *f)
 {
     ebpo_face_two out = *f;
     for (int i = 0; i < 2 && q->swapped; i++) {
         out.file[i] = f->file[!i];
-        out.source[i] = f->source[!i];
         memcpy(out.unposed[i], f->unposed[!i], sizeof out.unposed[i]);
     }
     return out;
@@ -630,5 +628,6 @@ ebpo_status ebpo_collide_distance(ebpo_collider *c, const ebpo_collide_options *
     if (!n.found)
         return EBPO_OK;
     report_pair(&q, &n, out);
-    return keep_nearest(&q, &n, error);
+    status = ebpo_collision_find_sources(&q, &out->pair, 1, error);
+    return status == EBPO_OK ? keep_nearest(&q, &n, error) : status;
 }

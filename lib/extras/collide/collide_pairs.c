@@ -151,10 +151,10 @@ ebpo_status ebpo_collide_first(ebpo_collider *c, const ebpo_collide_options *opt
         return status;
     const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
     status = ebpo_collision_first(&q, accel, "first contact", found, error);
-    if (status == EBPO_OK && *found == 1)
-        *out =
-            ebpo_collision_pair(&q, q.model[0]->whole, q.model[1]->whole, &c->walk.found_pairs[0]);
-    return status;
+    if (status != EBPO_OK || *found != 1)
+        return status;
+    *out = ebpo_collision_pair(&q, accel[0], accel[1], &c->walk.found_pairs[0]);
+    return ebpo_collision_find_sources(&q, out, 1, error);
 }
 
 static const char stage[] = "pairs of faces"; /* for the progress function */
@@ -336,16 +336,20 @@ typedef struct pair_receiver {
 enum { PASSED_AT_ONCE = 1024 }; /* greatest number of pairs in a call of the caller's function */
 
 /* Passes pairs to the caller, until there are no more pairs or the caller needs no more pairs. */
-static void pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uint64_t count)
+static ebpo_status pass_pairs(pair_receiver *v, const ebpo_found_pair *found_pairs, uint64_t count,
+                              ebpo_error *error)
 {
     ebpo_face_pair out[PASSED_AT_ONCE];
-    for (uint64_t at = 0; at < count && !v->enough; at += PASSED_AT_ONCE) {
+    ebpo_status status = EBPO_OK;
+    for (uint64_t at = 0; at < count && !v->enough && status == EBPO_OK; at += PASSED_AT_ONCE) {
         uint64_t n = count - at < PASSED_AT_ONCE ? count - at : PASSED_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
             out[i] = ebpo_collision_pair(v->collision, v->pair->accel[0], v->pair->accel[1],
                                          &found_pairs[at + i]);
-        v->enough = !v->take(v->user, out, n);
+        status = ebpo_collision_find_sources(v->collision, out, n, error);
+        v->enough = status != EBPO_OK || !v->take(v->user, out, n);
     }
+    return status;
 }
 
 /* Searches runs of consecutive faces of the first model. If the pairs of a run do not fit in
@@ -366,7 +370,9 @@ static ebpo_status search_in_runs(pair_receiver *v, pair_gathering *g, ebpo_erro
             run = run / 2;
             continue;
         }
-        pass_pairs(v, g->found_pairs, g->found_count);
+        status = pass_pairs(v, g->found_pairs, g->found_count, error);
+        if (status != EBPO_OK)
+            return status;
         begin = end;
         run = run < faces / 2 ? 2 * run : faces;
     }

@@ -483,6 +483,8 @@ ebpo_status ebpo_collide_separation(ebpo_collider *c, const ebpo_collide_options
                                             : separation_search_run(&s, whole, error);
     if (status == EBPO_OK)
         fill_separation(&s, exponent, out);
+    if (status == EBPO_OK && out->pair.file_face_a != EBPO_NO_FACE)
+        status = ebpo_collision_find_sources(&q, &out->pair, 1, error);
     ebpo_sweep_time_clear(&s.last);
     return status;
 }

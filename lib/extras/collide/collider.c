@@ -178,11 +178,22 @@ ebpo_face_pair ebpo_collision_pair(const ebpo_collision *q, const ebpo_accel *fi
                                    const ebpo_accel *second, const ebpo_found_pair *pair)
 {
     uint64_t file[2] = { ebpo_accel_file_face(first, pair->a),
-                         ebpo_accel_file_face(second, pair->b) },
-             source[2] = { ebpo_accel_source_face(first, pair->a),
-                           ebpo_accel_source_face(second, pair->b) };
+                         ebpo_accel_file_face(second, pair->b) };
     int a = q->swapped, b = !q->swapped;
-    return (ebpo_face_pair){ source[a], source[b], file[a], file[b], pair->kind, 0 };
+    return (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, file[a], file[b], pair->kind, 0 };
+}
+
+ebpo_status ebpo_collision_find_sources(const ebpo_collision *q, ebpo_face_pair *pairs,
+                                        uint64_t count, ebpo_error *error)
+{
+    const ebpo_model *a = q->model[q->swapped], *b = q->model[!q->swapped];
+    ebpo_status status = EBPO_OK;
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        status = ebpo_model_source_face(a, pairs[i].file_face_a, &pairs[i].face_a, error);
+        if (status == EBPO_OK)
+            status = ebpo_model_source_face(b, pairs[i].file_face_b, &pairs[i].face_b, error);
+    }
+    return status;
 }
 
 void ebpo_pair_walk_begin(ebpo_pair_walk *w, const ebpo_accel_pair *pair)

@@ -78,9 +78,13 @@ void ebpo_pair_walk_begin(ebpo_pair_walk *walk, const ebpo_accel_pair *pair);
 void ebpo_collider_count(ebpo_collider *collider, ebpo_pair_walk *walk);
 
 /* Converts a pair of local face indices of two accels (acceleration structures of subtrees) to the
- * pair that the caller receives. */
+ * pair that the caller receives, without the indices in the sources. */
 ebpo_face_pair ebpo_collision_pair(const ebpo_collision *collision, const ebpo_accel *first,
                                    const ebpo_accel *second, const ebpo_found_pair *pair);
+/* Sets the indices of the faces in the sources, by the indices in the files. */
+EBPO_MUST_USE ebpo_status ebpo_collision_find_sources(const ebpo_collision *collision,
+                                                      ebpo_face_pair *pairs, uint64_t count,
+                                                      ebpo_error *error);
 
 /* Finds the same pairs as ebpo_collide_self, but for the model at a pose: pose_a and pose_b of the
  * options, which must be equal. */

@@ -52,8 +52,8 @@ typedef struct subtree_pairs {
 
 /* Two intersecting faces. */
 typedef struct stored_pair {
-    uint32_t file[2], source[2]; /* [model] indices of the faces in the file and in the source */
-    int32_t kind;                /* ebpo_pair_kind */
+    uint32_t file[2]; /* [model] indices of the faces in the files */
+    int32_t kind;     /* ebpo_pair_kind */
 } stored_pair;
 
 /* The search of one thread. Zero at the beginning. */
@@ -653,11 +653,11 @@ static int compare_stored_pairs(const void *x, const void *y)
     return (p->file[1] > q->file[1]) - (p->file[1] < q->file[1]);
 }
 
-/* Converts a pair to the pair that the caller receives. */
+/* Converts a pair to the pair that the caller receives, without the indices in the sources. */
 static ebpo_face_pair face_pair_of(const ebpo_collision *q, const stored_pair *p)
 {
     int a = q->swapped, b = !q->swapped;
-    return (ebpo_face_pair){ p->source[a], p->source[b], p->file[a], p->file[b], p->kind, 0 };
+    return (ebpo_face_pair){ EBPO_NO_FACE, EBPO_NO_FACE, p->file[a], p->file[b], p->kind, 0 };
 }
 
 /* --- one pair of subtrees --- */
@@ -683,14 +683,12 @@ static ebpo_status store_pairs(subtree_walk *w, const ebpo_accel *const accel[2]
     for (uint64_t i = 0; i < found->found_count; i++) {
         uint32_t local[2] = { found->found_pairs[i].a, found->found_pairs[i].b };
         stored_pair p = { .kind = found->found_pairs[i].kind };
-        for (int side = 0; side < 2; side++) {
+        for (int side = 0; side < 2; side++)
             p.file[side] = (uint32_t)ebpo_accel_file_face(accel[side], local[side]);
-            p.source[side] = (uint32_t)ebpo_accel_source_face(accel[side], local[side]);
-        }
         if (w->self && p.file[0] == p.file[1])
             continue;
         if (w->self && p.file[0] > p.file[1])
-            p = (stored_pair){ { p.file[1], p.file[0] }, { p.source[1], p.source[0] }, p.kind };
+            p = (stored_pair){ { p.file[1], p.file[0] }, p.kind };
         w->stored[w->count++] = p;
     }
     return EBPO_OK;
@@ -952,20 +950,23 @@ static ebpo_status run_all(gathering_parts *g, ebpo_error *error)
 
 enum { PASSED_AT_ONCE = 1024 }; /* greatest number of pairs in a call of the caller's function */
 
-/* Passes the waiting pairs to the caller. Returns false if the caller needs no more pairs. */
-static bool pass_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user)
+/* Passes the waiting pairs to the caller. Sets *more to false if the caller needs no more pairs. */
+static ebpo_status pass_waiting(const gathering_parts *g, ebpo_pairs_fn take, void *user,
+                                bool *more, ebpo_error *error)
 {
     ebpo_face_pair out[PASSED_AT_ONCE];
+    ebpo_status status = EBPO_OK;
+    *more = true;
     for (unsigned i = 0; i < g->threads; i++) /* `take` may need the memory of subtrees */
         subtree_walk_let_go(&g->walk[i]);
-    for (uint64_t at = 0; at < g->count; at += PASSED_AT_ONCE) {
+    for (uint64_t at = 0; at < g->count && *more && status == EBPO_OK; at += PASSED_AT_ONCE) {
         uint64_t n = g->count - at < PASSED_AT_ONCE ? g->count - at : PASSED_AT_ONCE;
         for (uint64_t i = 0; i < n; i++)
             out[i] = face_pair_of(g->collision, &g->stored[at + i]);
-        if (!take(user, out, n))
-            return false;
+        status = ebpo_collision_find_sources(g->collision, out, n, error);
+        *more = status == EBPO_OK && take(user, out, n);
     }
-    return true;
+    return status;
 }
 
 /* Searches in rounds, each of which finds all pairs of a range of faces of the first model. */
@@ -981,8 +982,10 @@ static ebpo_status search_in_rounds(gathering_parts *g, ebpo_pairs_fn take, void
         if (status != EBPO_OK)
             return status;
         sort_unique(g);
-        if (!pass_waiting(g, take, user))
-            return EBPO_OK;
+        bool more;
+        status = pass_waiting(g, take, user, &more, error);
+        if (status != EBPO_OK || !more)
+            return status;
     }
     return EBPO_OK;
 }
@@ -1100,7 +1103,7 @@ static ebpo_status search_first_parts(gathering_parts *g, nearest_pairs *pairs, 
         if (*found) {
             qsort(w->stored, w->count, sizeof *w->stored, compare_stored_pairs);
             *out = face_pair_of(q, &w->stored[0]);
-            return EBPO_OK;
+            return ebpo_collision_find_sources(q, out, 1, error);
         }
         if (!ebpo_progress_step(&q->options.progress, stage, pairs->found - 1, 0, error))
             return EBPO_E_CANCELLED;
