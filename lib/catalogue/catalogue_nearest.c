@@ -340,6 +340,6 @@ ebpo_status ebpo_catalogue_ray(const ebpo_catalogue *c, ebpo_catalogue_models *m
     if (status == EBPO_OK)
         status = ebpo_catalogue_need_surface(c, error);
     if (status == EBPO_OK)
-        status = ebpo_check_ray_rows(rays, count, error);
+        status = ebpo_check_ray_rows(rays, 0, count, error);
     return status == EBPO_OK ? ebpo_catalogue_query_rows(&j, count, error) : status;
 }

@@ -264,16 +264,11 @@ typedef struct ebpo_inside_kernels {
 typedef struct ebpo_nearest_kernels {
     void (*walk)(ebpo_near_search *search);
 } ebpo_nearest_kernels;
-/* EBPO_RAY_GROUP: maximum number of rays of a group. EBPO_RAY_PACKET: maximum number of similar
- * rays among them that are walked as a packet. EBPO_RAY_BUNDLE: maximum number of rays that one
- * call of ebpo_ray_kernels.misses tests. */
-enum { EBPO_RAY_GROUP = 16, EBPO_RAY_PACKET = 8, EBPO_RAY_BUNDLE = 32 };
-/* Candidates of a ray of a packet. */
+/* EBPO_RAY_GROUP: maximum number of rays of a group, a bit of a mask for each. EBPO_RAY_TURNS:
+ * maximum number of rays among them that take turns. */
+enum { EBPO_RAY_GROUP = 32, EBPO_RAY_TURNS = 16 };
+/* Maximum number of candidates of a ray of a packet. */
 enum { EBPO_RAY_FEW = 8 };
-typedef struct ebpo_ray_few {
-    unsigned count;
-    ebpo_ray_candidate waiting[EBPO_RAY_FEW];
-} ebpo_ray_few;
 /* Rays through one accel. */
 typedef struct ebpo_ray_group {
     const ebpo_accel *s;
@@ -284,23 +279,24 @@ typedef struct ebpo_ray_group {
     /* Begins the search of ray i. Returns NULL if the ray misses all faces. */
     ebpo_ray_search *(*begin)(void *user, unsigned i);
     void *user;
-    /* Set by walk_many: the candidates of rays whose search is not begun. The caller must test
-     * them. (During the walk of a packet, also those of other rays.) */
-    ebpo_ray_few few[EBPO_RAY_GROUP];
+    /* Set by walk_many. search: the searches that are begun; NULL: not begun, or the ray misses all
+     * faces. few, candidate: number of candidates and candidates of rays whose search is not begun.
+     * The caller must test them. (During the walk of a packet, also those of other rays.) */
+    ebpo_ray_search *search[EBPO_RAY_GROUP];
+    uint8_t few[EBPO_RAY_GROUP];
+    ebpo_ray_candidate candidate[EBPO_RAY_GROUP][EBPO_RAY_FEW];
     /* Space for walk_many. Without the additional visits, the beginnings of all rows would compete
      * for the same lines of the processor's cache. */
-    ebpo_visit stack[EBPO_RAY_GROUP][EBPO_VISITS_MAX + 24];
-    float enter[EBPO_VISITS_MAX][EBPO_RAY_PACKET];
+    ebpo_visit stack[EBPO_RAY_TURNS][EBPO_VISITS_MAX + 24];
+    float enter[EBPO_VISITS_MAX]; /* keys of the visits in stack[0] of a packet */
 } ebpo_ray_group;
 
 typedef struct ebpo_ray_kernels {
     void (*walk)(ebpo_ray_search *search);
     /* Walks with all rays of a group. Rays with similar origins and directions, one after another,
-     * share the visits of nodes; other rays take turns. */
-    void (*walk_many)(ebpo_ray_group *group);
-    /* Returns true if all rays certainly miss all faces. Only similar rays that do not come near
-     * faces are certain. `count`: 1 to EBPO_RAY_BUNDLE. */
-    bool (*misses)(const ebpo_accel *s, const ebpo_ray *rays, unsigned count);
+     * share the visits of nodes; other rays take turns. Returns a bit for each ray that has a
+     * search or candidates. */
+    uint32_t (*walk_many)(ebpo_ray_group *group);
 } ebpo_ray_kernels;
 
 EBPO_KERNELS(ebpo_inside_kernels, ebpo_inside_kernels)

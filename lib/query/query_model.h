@@ -105,8 +105,9 @@ static inline ebpo_box ebpo_model_box(const ebpo_model *m) { return ebpo_root_bo
 EBPO_MUST_USE ebpo_status ebpo_check_points(const double *points, uint64_t count,
                                             ebpo_error *error);
 
-/* Returns EBPO_E_ARGUMENT if a ray is invalid; the message gives the ray's index. */
-EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count,
+/* Returns EBPO_E_ARGUMENT if one of the rays begin .. end - 1 is invalid; the message gives the
+ * ray's index. */
+EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t begin, uint64_t end,
                                               ebpo_error *error);
 
 /* Returns EBPO_E_LIMIT if the budget is too small for this leaf in addition to the top and the

@@ -438,10 +438,10 @@ EBPO_EIGHT unsigned bundle_children(const ray_bundle *p, const ebpo_bound *b, bu
 EBPO_EIGHT double greater_of(double a, double b) { return a > b ? a : b; }
 EBPO_EIGHT double lesser_of(double a, double b) { return a < b ? a : b; }
 
-/* Greatest number of nodes that ray_misses visits. */
+/* Greatest number of nodes that bundle_misses visits. */
 enum { MISS_NODES = 12 };
-/* Greatest coordinate of an origin in ray_misses, as a multiple of the accel's largest coordinate.
- * Origins are not moved, so the bounds of a bundle from far away are wide. */
+/* Greatest coordinate of an origin in bundle_misses, as a multiple of the accel's largest
+ * coordinate. Origins are not moved, so the bounds of a bundle from far away are wide. */
 static const double miss_reach = 64;
 /* Sets the bundle on one axis, from the least and greatest origin and direction in the frame. */
 EBPO_EIGHT void bundle_set_axis(ray_bundle *b, int k, const double origin[2], const double d[2],
@@ -457,36 +457,37 @@ EBPO_EIGHT void bundle_set_axis(ray_bundle *b, int k, const double origin[2], co
     b->far_inverse[k] = (float)farther;
 }
 
+/* Four numbers of an ebpo_ray: those of the origin and the first one of the direction, or those of
+ * the direction and t_max. */
+EBPO_EIGHT v4d ray_numbers(const double *x)
+{
+    v4d out;
+    memcpy(&out, x, sizeof out);
+    return out;
+}
+
 /* Sets the bundle of rays. Returns false if they have no bundle: a coordinate of their directions
  * has both signs, the directions need to be scaled, or the origins are far away. */
-EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
+EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *const *ray,
+                           unsigned count)
 {
-    v4d least[3], most[3], d_least[3], d_most[3]; /* of four rays each */
-    for (int k = 0; k < 3; k++) {
-        least[k] = most[k] = v4d_all(ray->origin[k]);
-        d_least[k] = d_most[k] = v4d_all(ray->direction[k]);
-    }
-    for (unsigned i = 0; i < count; i += 4) {
-        unsigned last = count - 1;
-        const ebpo_ray *a = ray + i, *x = ray + (i + 1 < last ? i + 1 : last),
-                       *y = ray + (i + 2 < last ? i + 2 : last),
-                       *z = ray + (i + 3 < last ? i + 3 : last);
-        for (int k = 0; k < 3; k++) {
-            v4d o = { a->origin[k], x->origin[k], y->origin[k], z->origin[k] },
-                d = { a->direction[k], x->direction[k], y->direction[k], z->direction[k] };
-            least[k] = v4d_min(o, least[k]);
-            most[k] = v4d_max(o, most[k]);
-            d_least[k] = v4d_min(d, d_least[k]);
-            d_most[k] = v4d_max(d, d_most[k]);
-        }
+    v4d o = ray_numbers(ray[0]->origin), v = ray_numbers(ray[0]->direction), least = o, most = o,
+        d_least = v, d_most = v;
+    for (unsigned i = 1; i < count; i++) {
+        o = ray_numbers(ray[i]->origin);
+        v = ray_numbers(ray[i]->direction);
+        least = v4d_min(o, least);
+        most = v4d_max(o, most);
+        d_least = v4d_min(v, d_least);
+        d_most = v4d_max(v, d_most);
     }
     double origin[3][2], d[3][2], greatest = 0, longest = 0, sure = 0;
     unsigned signs = 0;
     for (int k = 0; k < 3; k++) {
-        origin[k][0] = (-v4d_greatest(-least[k]) - s->centre[k]) * s->scale;
-        origin[k][1] = (v4d_greatest(most[k]) - s->centre[k]) * s->scale;
-        d[k][0] = -v4d_greatest(-d_least[k]);
-        d[k][1] = v4d_greatest(d_most[k]);
+        origin[k][0] = (least[k] - s->centre[k]) * s->scale;
+        origin[k][1] = (most[k] - s->centre[k]) * s->scale;
+        d[k][0] = d_least[k];
+        d[k][1] = d_most[k];
         if (d[k][0] < 0 && d[k][1] > 0)
             return false;
         greatest = greater_of(greatest, greater_of(fabs(origin[k][0]), fabs(origin[k][1])));
@@ -504,12 +505,14 @@ EBPO_EIGHT bool bundle_set(ray_bundle *b, const ebpo_accel *s, const ebpo_ray *r
     return true;
 }
 
-static bool ray_misses(const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
+/* Returns true if all rays certainly miss all faces. Only similar rays that do not come near faces
+ * are certain. */
+static bool bundle_misses(const ebpo_accel *s, const ebpo_ray *const *ray, unsigned count)
 {
     ray_bundle bundle;
     uint32_t stack[8 * MISS_NODES];
     unsigned top = 0;
-    if (s->bound_count == 0 || s->root_bound & EBPO_IS_BLOCK || !bundle_set(&bundle, s, ray, count))
+    if (!bundle_set(&bundle, s, ray, count))
         return false;
     stack[top++] = s->root_bound;
     for (int visits = 0; top; visits++) {
@@ -529,107 +532,131 @@ static bool ray_misses(const ebpo_accel *s, const ebpo_ray *ray, unsigned count)
     return true;
 }
 
-/* --- packets: eight rays walked together --- */
+/* --- packets: similar rays walked together --- */
 
-/* The rays of a packet in the frame, as in ebpo_ray_search: four in each vector. Unused lanes
- * repeat another ray. */
+/* Eights of a packet's rays. */
+enum { EIGHTS = EBPO_RAY_GROUP / 8 };
+
+/* The rays of a packet in the frame, as in ebpo_ray_search: four in each vector. */
 typedef struct packet_frame {
-    v4d origin[3][2], direction[3][2];
+    v4d origin[3][2 * EIGHTS], direction[3][2 * EIGHTS];
     double from[3]; /* the first ray's origin in the model's unit */
     double error;   /* the greatest of all rays */
 } packet_frame;
 
-/* Each child that the bundle may intersect is tested for each ray. If one ray is left, this ray
- * walks on alone. Arrays of eight floats have a ray in each lane; all numbers are in the frame,
- * except `high` and `low`. */
+/* Each child that the bundle may intersect is tested for each ray that enters its parent. If one
+ * ray is left, this ray walks on alone. Arrays of floats have a ray in each lane; all numbers are
+ * in the frame, except `high` and `low`. */
 typedef struct ray_packet {
     ebpo_ray_group *g;
-    unsigned first, count;                    /* the group's rays first .. first + count - 1 */
-    ebpo_ray_search *search[EBPO_RAY_PACKET]; /* NULL: not begun */
+    unsigned first, count; /* the group's rays first .. first + count - 1 */
+    unsigned eights;       /* unused lanes of the last eight repeat a ray */
     packet_frame frame;
     ray_bundle bundle;
-    float from_near[3][8], from_far[3][8], inverse[3][8], bounds[8];
+    float from_near[3][EBPO_RAY_GROUP], from_far[3][EBPO_RAY_GROUP], inverse[3][EBPO_RAY_GROUP];
+    float bounds[EBPO_RAY_GROUP];
     /* For tests of faces (packet_faces). high + low: the first ray's origin in the model's unit.
      * shift: origins minus the first ray's origin. moment: shift x direction. apart: false if all
      * shifts are 0. axis: the longest axis of the first direction. */
-    float high[3], low[3], direction[3][8], shift[3][8], moment[3][8];
+    float high[3], low[3], direction[3][EBPO_RAY_GROUP], shift[3][EBPO_RAY_GROUP];
+    float moment[3][EBPO_RAY_GROUP];
     bool apart;
     int axis;
-    float side_error;  /* error of sides (packet_side), per length of an edge */
-    float t_errors[8]; /* error of t for a certain weight of corners */
+    float side_error;               /* error of sides (packet_side), per length of an edge */
+    float t_errors[EBPO_RAY_GROUP]; /* error of t for a certain weight of corners */
 } ray_packet;
 
 /* Greatest width of a bundle in an accel, in the frame. Wider packets have no advantage. */
-static const double packet_width = 0.25;
+static const double packet_width = 0.5;
 
 /* Returns the greatest of eight floats. */
 EBPO_EIGHT float greatest_of(f8 a) { return -f8_least(f8_sub(f8_all(0), a)); }
 
-/* Sets the rays and the bundle on one axis. */
-EBPO_EIGHT void packet_set_axis(ray_packet *p, int k, bool down, f8 near, f8 far, f8 inverse)
-{
-    float least = f8_least(inverse), most = greatest_of(inverse);
-    f8_store(p->from_near[k], near);
-    f8_store(p->from_far[k], far);
-    f8_store(p->inverse[k], inverse);
-    p->bundle.near_from[k] = down ? f8_least(near) : greatest_of(near);
-    p->bundle.far_from[k] = down ? greatest_of(far) : f8_least(far);
-    p->bundle.near_inverse[k] = down ? most : least;
-    p->bundle.far_inverse[k] = down ? least : most;
-}
-
-/* Returns true if rays are similar enough to walk together: all directions have the same signs,
- * and the bundle is narrow, all the way to the far end of the accel. */
-EBPO_EIGHT bool packet_is_coherent(const packet_frame *f, const ebpo_accel *s)
+/* Returns a bit for each of the eight rays from `begin` that is similar enough to the first one to
+ * walk with it: all directions have the same signs, and the bundle is narrow, all the way to the
+ * far end of the accel. */
+EBPO_EIGHT unsigned packet_similar(const packet_frame *f, const ebpo_accel *s, unsigned begin)
 {
     double longest = 0, way = s->largest_coordinate;
+    unsigned out = 0;
     for (int k = 0; k < 3; k++) {
         double d = fabs(f->direction[k][0][0]), o = fabs(f->origin[k][0][0]);
         longest = d > longest ? d : longest;
         way = o > way ? o : way;
     }
-    v4l similar = ~(v4l){ 0, 0, 0, 0 };
-    for (int k = 0; k < 3; k++)
-        for (int h = 0; h < 2; h++) {
-            v4d origin = f->origin[k][h], d = f->direction[k][h],
+    for (unsigned h = 0; h < 2; h++) {
+        v4l similar = ~(v4l){ 0, 0, 0, 0 };
+        for (int k = 0; k < 3; k++) {
+            v4d origin = f->origin[k][begin / 4 + h], d = f->direction[k][begin / 4 + h],
                 first = v4d_all(f->direction[k][0][0]);
             similar &= v4d_abs(origin - f->origin[k][0][0]) * longest + v4d_abs(d - first) * way <
                        packet_width * longest;
             similar &= ~((v4l)d ^ (v4l)first);
         }
-    return v4l_mask(similar) == 15;
+        out |= v4l_mask(similar) << 4 * h;
+    }
+    return out;
 }
 
-EBPO_EIGHT void packet_set_bounds(ray_packet *p, f8 bounds)
+/* Sets the bundle's bound after bounds of rays have changed. */
+EBPO_EIGHT void packet_set_bound(ray_packet *p)
 {
-    f8_store(p->bounds, bounds);
-    p->bundle.bound = greatest_of(bounds);
+    f8 greatest = f8_load(p->bounds);
+    for (unsigned e = 1; e < p->eights; e++)
+        greatest = f8_max(f8_load(p->bounds + 8 * e), greatest);
+    p->bundle.bound = greatest_of(greatest);
 }
 
-/* Returns the bounds with another bound of ray i. */
-EBPO_EIGHT f8 packet_with_bound(f8 bounds, unsigned i, float bound)
+/* Returns these bits in all lanes. */
+EBPO_EIGHT f8 f8_of_bits(uint32_t bits)
 {
-    return f8_pick(f8_mask(1u << i), f8_all(bound), bounds);
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return f8_all(x);
 }
 
-/* Sets what tests of boxes use (ray_set_boxes), except the bounds. */
-EBPO_EIGHT void packet_set(ray_packet *p)
+/* Sets what tests of boxes use (ray_set_boxes), on one axis. */
+EBPO_EIGHT void packet_set_axis(ray_packet *p, int k)
 {
     const packet_frame *f = &p->frame;
-    unsigned signs = 0;
-    for (int k = 0; k < 3; k++) {
-        bool down = v4l_mask((v4l)f->direction[k][0]) & 1;
+    bool down = v4l_mask((v4l)f->direction[k][0]) & 1;
+    f8 most_near = f8_all(-INFINITY), most_far = most_near, most_inverse = most_near,
+       least_near = f8_all(INFINITY), least_far = least_near, least_inverse = least_near;
+    for (unsigned e = 0; e < p->eights; e++) {
         v4d near[2], far[2], inverse[2];
         for (int h = 0; h < 2; h++) {
-            v4d d = f->direction[k][h], origin = f->origin[k][h],
+            v4d d = f->direction[k][2 * e + h], origin = f->origin[k][2 * e + h],
                 ahead = v4d_signed(v4d_abs(origin) * 0x1p-21 + f->error, d);
             near[h] = origin + ahead;
             far[h] = origin - ahead;
             inverse[h] = 1 / v4d_signed(v4d_max(v4d_abs(d), v4d_all(0x1p-72)), d);
         }
-        packet_set_axis(p, k, down, f8_from_doubles(near[0], near[1]),
-                        f8_from_doubles(far[0], far[1]), f8_from_doubles(inverse[0], inverse[1]));
-        signs |= (unsigned)down << k;
+        f8 n = f8_from_doubles(near[0], near[1]), a = f8_from_doubles(far[0], far[1]),
+           i = f8_from_doubles(inverse[0], inverse[1]);
+        f8_store(p->from_near[k] + 8 * e, n);
+        f8_store(p->from_far[k] + 8 * e, a);
+        f8_store(p->inverse[k] + 8 * e, i);
+        most_near = f8_max(n, most_near);
+        least_near = f8_min(n, least_near);
+        most_far = f8_max(a, most_far);
+        least_far = f8_min(a, least_far);
+        most_inverse = f8_max(i, most_inverse);
+        least_inverse = f8_min(i, least_inverse);
+    }
+    float least = f8_least(least_inverse), most = greatest_of(most_inverse);
+    p->bundle.near_from[k] = down ? f8_least(least_near) : greatest_of(most_near);
+    p->bundle.far_from[k] = down ? greatest_of(most_far) : f8_least(least_far);
+    p->bundle.near_inverse[k] = down ? most : least;
+    p->bundle.far_inverse[k] = down ? least : most;
+}
+
+/* Sets what tests of boxes use, except the bounds. */
+EBPO_EIGHT void packet_set(ray_packet *p)
+{
+    unsigned signs = 0;
+    for (int k = 0; k < 3; k++) {
+        packet_set_axis(p, k);
+        signs |= (v4l_mask((v4l)p->frame.direction[k][0]) & 1) << k;
     }
     p->bundle.side_at = ray_side_at[signs];
 }
@@ -639,59 +666,67 @@ EBPO_EIGHT void packet_set_faces(ray_packet *p, const ebpo_accel *s)
 {
     const packet_frame *f = &p->frame;
     v4d longest = v4d_all(0), widest = v4d_all(0);
-    f8 shift[3], d[3];
     p->axis = 0;
     for (int k = 0; k < 3; k++) {
-        v4d first = v4d_all(f->origin[k][0][0]), x = f->origin[k][0] - first,
-            y = f->origin[k][1] - first;
-        longest = v4d_max(v4d_abs(f->direction[k][0]), longest);
-        longest = v4d_max(v4d_abs(f->direction[k][1]), longest);
-        widest = v4d_max(v4d_abs(x), v4d_max(v4d_abs(y), widest));
+        v4d first = v4d_all(f->origin[k][0][0]);
+        for (unsigned e = 0; e < p->eights; e++) {
+            const v4d *d = &f->direction[k][2 * e];
+            v4d x = f->origin[k][2 * e] - first, y = f->origin[k][2 * e + 1] - first;
+            longest = v4d_max(v4d_abs(d[0]), v4d_max(v4d_abs(d[1]), longest));
+            widest = v4d_max(v4d_abs(x), v4d_max(v4d_abs(y), widest));
+            f8_store(p->shift[k] + 8 * e, f8_from_doubles(x, y));
+            f8_store(p->direction[k] + 8 * e, f8_from_doubles(d[0], d[1]));
+        }
         if (fabs(f->direction[k][0][0]) > fabs(f->direction[p->axis][0][0]))
             p->axis = k;
-        shift[k] = f8_from_doubles(x, y);
-        d[k] = f8_from_doubles(f->direction[k][0], f->direction[k][1]);
-        f8_store(p->shift[k], shift[k]);
-        f8_store(p->direction[k], d[k]);
         p->high[k] = (float)f->from[k];
         p->low[k] = (float)(f->from[k] - (double)p->high[k]);
     }
     double width = v4d_greatest(widest), way = s->largest_coordinate + width;
     for (int k = 0; k < 3; k++)
         way = greater_of(way, s->largest_coordinate + width + fabs(f->origin[k][0][0]));
-    p->apart = width > 0;
-    for (int k = 0; k < 3 && p->apart; k++) {
-        int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
-        f8_store(p->moment[k], f8_sub(f8_mul(shift[u], d[v]), f8_mul(shift[v], d[u])));
-    }
     float reach = (float)(way + f->error * 0x1p23 + 0x1p-30);
+    p->apart = width > 0;
     p->side_error = reach * (float)v4d_greatest(longest) * 0x1.2p-18f;
-    f8_store(p->t_errors, f8_mul(f8_abs(f8_load(p->inverse[p->axis])), f8_all(reach * 0x1p-19f)));
+    for (unsigned i = 0; i < 8 * p->eights; i += 8) {
+        f8_store(p->t_errors + i,
+                 f8_mul(f8_abs(f8_load(p->inverse[p->axis] + i)), f8_all(reach * 0x1p-19f)));
+        for (int k = 0; k < 3 && p->apart; k++) {
+            int u = k == 2 ? 0 : k + 1, v = k == 0 ? 2 : k - 1;
+            f8_store(p->moment[k] + i,
+                     f8_sub(f8_mul(f8_load(p->shift[u] + i), f8_load(p->direction[v] + i)),
+                            f8_mul(f8_load(p->shift[v] + i), f8_load(p->direction[u] + i))));
+        }
+    }
 }
 
-/* Returns a bit for each ray that may intersect the box of child `lane` before the ray's bound.
- * *enter: the t at which each ray enters the box. */
+/* Returns a bit for each of the eights begin .. end - 1 of rays that may intersect the box of child
+ * `lane` before the ray's bound. */
 EBPO_EIGHT unsigned packet_rays(const ray_packet *p, const bundle_sides *sides, unsigned lane,
-                                f8 *enter)
+                                unsigned begin, unsigned end)
 {
-    f8 from = f8_all(0), to = f8_load(p->bounds);
-    for (int k = 0; k < 3; k++) {
-        f8 near = f8_all(sides->near[k][lane]), far = f8_all(sides->far[k][lane]),
-           inverse = f8_load(p->inverse[k]);
-        from = f8_max(f8_mul(f8_sub(near, f8_load(p->from_near[k])), inverse), from);
-        to = f8_min(f8_mul(f8_sub(far, f8_load(p->from_far[k])), inverse), to);
+    unsigned out = 0;
+    for (unsigned i = begin; i < end; i += 8) {
+        f8 from = f8_all(0), to = f8_load(p->bounds + i);
+        for (int k = 0; k < 3; k++) {
+            f8 near = f8_all(sides->near[k][lane]), far = f8_all(sides->far[k][lane]),
+               inverse = f8_load(p->inverse[k] + i);
+            from = f8_max(f8_mul(f8_sub(near, f8_load(p->from_near[k] + i)), inverse), from);
+            to = f8_min(f8_mul(f8_sub(far, f8_load(p->from_far[k] + i)), inverse), to);
+        }
+        out |= f8_bits(f8_at_most(from, to)) << i;
     }
-    *enter = from;
-    return f8_bits(f8_at_most(from, to));
+    return out;
 }
 
 /* Returns the search of a ray of the packet; NULL if the ray misses all faces. (This is certain
  * before the walk only for rays with moved origins, which packet_read refuses.) */
 static ebpo_ray_search *packet_search(ray_packet *p, unsigned i)
 {
-    if (!p->search[i])
-        p->search[i] = ray_begin(p->g, p->first + i);
-    return p->search[i];
+    ebpo_ray_search **search = &p->g->search[p->first + i];
+    if (!*search)
+        *search = ray_begin(p->g, p->first + i);
+    return *search;
 }
 
 /* The faces of a block, relative to the first origin of a packet. Edge i is from corner i to the
@@ -822,24 +857,30 @@ EBPO_EIGHT void packet_hits(const ray_packet *p, const packet_faces *b, unsigned
 /* Drops candidates of ray i of the packet that are beyond `bound`. */
 static void packet_drop_beyond(ray_packet *p, unsigned i, float bound)
 {
-    ebpo_ray_few *few = &p->g->few[p->first + i];
-    unsigned kept = 0;
-    for (unsigned k = 0; k < few->count; k++)
-        if (!(few->waiting[k].low > bound))
-            few->waiting[kept++] = few->waiting[k];
-    few->count = kept;
+    ebpo_ray_candidate *waiting = p->g->candidate[p->first + i];
+    uint8_t *few = &p->g->few[p->first + i], kept = 0;
+    for (unsigned k = 0; k < *few; k++)
+        if (!(waiting[k].low > bound))
+            waiting[kept++] = waiting[k];
+    *few = kept;
+}
+
+/* Moves the candidates of ray i of the packet to its search. */
+static void packet_move_waiting(ray_packet *p, unsigned i, ebpo_ray_search *r)
+{
+    uint8_t *few = &p->g->few[p->first + i];
+    memcpy(r->waiting, p->g->candidate[p->first + i], *few * sizeof *r->waiting);
+    r->count = *few;
+    *few = 0;
 }
 
 /* Tests all candidates of ray i of the packet. Returns the new bound. */
 static float packet_judge(ray_packet *p, unsigned i, float bound)
 {
-    ebpo_ray_few *few = &p->g->few[p->first + i];
     ebpo_ray_search *r = packet_search(p, i);
-    memcpy(r->waiting, few->waiting, few->count * sizeof *few->waiting);
-    r->count = (int)few->count;
+    packet_move_waiting(p, i, r);
     r->bound = bound < r->bound ? bound : r->bound;
     r->judge(r);
-    few->count = 0;
     return r->bound;
 }
 
@@ -848,15 +889,16 @@ static float packet_judge(ray_packet *p, unsigned i, float bound)
 EBPO_EIGHT float packet_keep(ray_packet *p, unsigned i, uint32_t block, const ray_lanes *found,
                              float bound)
 {
-    ebpo_ray_few *few = &p->g->few[p->first + i];
+    ebpo_ray_candidate *waiting = p->g->candidate[p->first + i];
+    uint8_t *few = &p->g->few[p->first + i];
     for (unsigned lanes = found->alive; lanes; lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
         int facing = (int)(found->front >> lane & 1) - (int)(found->back >> lane & 1);
-        if (few->count == EBPO_RAY_FEW)
+        if (*few == EBPO_RAY_FEW)
             packet_drop_beyond(p, i, bound);
-        if (few->count == EBPO_RAY_FEW)
+        if (*few == EBPO_RAY_FEW)
             bound = packet_judge(p, i, bound);
-        few->waiting[few->count++] =
+        waiting[(*few)++] =
             (ebpo_ray_candidate){ found->low[lane], block * EBPO_BLOCK + lane, facing };
         if (found->sure >> lane & 1 && found->high[lane] < bound)
             bound = found->high[lane];
@@ -864,120 +906,126 @@ EBPO_EIGHT float packet_keep(ray_packet *p, unsigned i, uint32_t block, const ra
     return bound;
 }
 
-/* Visits a block with the rays that may intersect its box. */
-static void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block, unsigned rays)
+/* Visits a block with the rays that may intersect its box at a t of at least `enter`. */
+static void packet_block(ray_packet *p, const ebpo_accel *s, uint32_t block, unsigned rays,
+                         float enter)
 {
     packet_faces faces;
-    f8 bounds = f8_load(p->bounds);
+    for (unsigned left = rays; left; left &= left - 1)
+        if (p->bounds[__builtin_ctz(left)] < enter)
+            rays &= ~(left & -left);
+    if (!rays)
+        return;
     packet_set_block(p, s, block, &faces);
     for (; rays; rays &= rays - 1) {
         unsigned i = (unsigned)__builtin_ctz(rays);
         ray_lanes found;
         packet_hits(p, &faces, i, f8_all(p->bounds[i]), &found);
         if (found.alive)
-            bounds = packet_with_bound(bounds, i, packet_keep(p, i, block, &found, p->bounds[i]));
-    }
-    packet_set_bounds(p, bounds);
-}
-
-/* Walks with one ray through a child that no other ray enters. `stack`: the free part of the
- * packet's stack, which has space for the levels below the child. */
-static void packet_single(ray_packet *p, const ebpo_accel *s, uint32_t begin, ebpo_visit *stack,
-                          unsigned ray)
-{
-    ebpo_ray_search r; /* only the fields for tests of boxes */
-    uint32_t top = 1;
-    r.near_from[3] = r.far_from[3] = r.inverse[3] = r.step_inverse[0] = 0; /* not used */
-    for (int k = 0; k < 3; k++) {
-        r.near_from[k] = p->from_near[k][ray];
-        r.far_from[k] = p->from_far[k][ray];
-        r.inverse[k] = r.step_inverse[k + 1] = p->inverse[k][ray];
-    }
-    r.side_at = p->bundle.side_at;
-    stack[0] = ebpo_visit_make(0, begin);
-    while (top) {
-        ebpo_visit v = stack[--top];
-        uint32_t child = (uint32_t)v;
-        r.bound = p->bounds[ray];
-        if (ebpo_visit_key(v) > r.bound)
-            continue;
-        if (child & EBPO_IS_BLOCK) {
-            packet_block(p, s, child & ~EBPO_IS_BLOCK, 1u << ray);
-            continue;
-        }
-        f8 enter;
-        float key[8];
-        const ebpo_bound *b = &s->bound[child];
-        unsigned lanes = ray_children(&r, b, &enter);
-        f8_store(key, enter);
-        uint32_t before = top;
-        top = ebpo_visit_push(stack, top, b, lanes, key);
-        for (uint32_t i = before; i < top; i++)
-            ray_fetch(s, (uint32_t)stack[i], s->wide);
+            p->bounds[i] = packet_keep(p, i, block, &found, p->bounds[i]);
     }
 }
 
-/* Visits a node: pushes the children that a ray of the packet may enter, farthest first. Returns
- * the new top of the stack. */
-EBPO_EIGHT uint32_t packet_node(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack, uint32_t top,
-                                uint32_t node)
+/* Finds which of the rays may enter each child of a node: in[lane] has a bit for each ray. Returns
+ * a bit for each child that a ray may enter. *enter: at most the t at which the first ray enters
+ * each child. Tests the children that the bundle may intersect with eight rays at a time. */
+EBPO_EIGHT unsigned packet_children(ray_packet *p, const ebpo_bound *b, unsigned rays,
+                                    uint32_t in[8], f8 *enter)
 {
-    const ebpo_bound *b = &s->bound[node];
     bundle_sides sides;
-    f8 bundle_enter, enter[8];
-    uint32_t rays[8];
-    float key[8];
-    unsigned found = 0;
-    for (unsigned lanes = bundle_children(&p->bundle, b, &sides, &bundle_enter); lanes;
+    unsigned found = 0, begin = (unsigned)__builtin_ctz(rays) & ~7u,
+             end = 32 - (unsigned)__builtin_clz(rays);
+    packet_set_bound(p);
+    for (unsigned lanes = bundle_children(&p->bundle, b, &sides, enter); lanes;
          lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes);
-        rays[lane] = packet_rays(p, &sides, lane, &enter[lane]);
-        found |= (unsigned)(rays[lane] != 0) << lane;
+        in[lane] = packet_rays(p, &sides, lane, begin, end) & rays;
+        found |= (unsigned)(in[lane] != 0) << lane;
     }
-    f8_store(key, bundle_enter);
+    return found;
+}
+
+/* Does the same as packet_children for a few rays: tests eight children with one ray at a time. */
+EBPO_EIGHT unsigned packet_children_of_few(const ray_packet *p, const ebpo_bound *b, unsigned rays,
+                                           uint32_t in[8], f8 *enter)
+{
+    f8 near[3], far[3], every = f8_all(0), any = every, least = f8_all(EBPO_RAY_BEYOND);
+    for (int k = 0; k < 3; k++) {
+        f8 origin = f8_all(b->origin[k]), step = f8_all(b->step[k]);
+        near[k] = side_at(b, p->bundle.side_at[0][k], step, origin);
+        far[k] = side_at(b, p->bundle.side_at[1][k], step, origin);
+    }
+    for (; rays; rays &= rays - 1) {
+        unsigned i = (unsigned)__builtin_ctz(rays);
+        f8 from = f8_all(0), to = f8_all(p->bounds[i]);
+        for (int k = 0; k < 3; k++) {
+            f8 inverse = f8_all(p->inverse[k][i]);
+            from = f8_max(f8_mul(f8_sub(near[k], f8_all(p->from_near[k][i])), inverse), from);
+            to = f8_min(f8_mul(f8_sub(far[k], f8_all(p->from_far[k][i])), inverse), to);
+        }
+        f8 enters = f8_at_most(from, to);
+        any = f8_or(any, enters);
+        every = f8_or(every, f8_and(enters, f8_of_bits(1u << i)));
+        least = f8_min(from, least);
+    }
+    memcpy(in, &every, sizeof every);
+    *enter = least;
+    return f8_bits(any) & ((1u << b->count) - 1);
+}
+
+/* Greatest number of rays for packet_children_of_few. */
+enum { PACKET_FEW = 6 };
+
+/* Visits a node: pushes the children that one of the rays may enter, farthest first. Returns the
+ * new top of the stack. */
+EBPO_EIGHT uint32_t packet_node(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack, uint32_t top,
+                                uint32_t node, unsigned rays)
+{
+    const ebpo_bound *b = &s->bound[node];
+    f8 enter;
+    float key[8];
+    uint32_t in[8];
+    unsigned found = __builtin_popcount(rays) <= PACKET_FEW
+                         ? packet_children_of_few(p, b, rays, in, &enter)
+                         : packet_children(p, b, rays, in, &enter);
+    f8_store(key, enter);
     for (unsigned lanes = found; lanes; lanes &= lanes - 1) {
         unsigned lane = (unsigned)__builtin_ctz(lanes), before = (1u << lane) - 1;
         /* the children that are farther, and earlier children that are as far, are below */
         f8 own = f8_all(key[lane]);
-        unsigned below = (f8_bits(f8_less(own, bundle_enter)) |
-                          (f8_bits(f8_at_most(own, bundle_enter)) & before)) &
-                         found;
+        unsigned below =
+            (f8_bits(f8_less(own, enter)) | (f8_bits(f8_at_most(own, enter)) & before)) & found;
         uint32_t at = top + (uint32_t)__builtin_popcount(below);
         ray_fetch(s, b->child[lane], s->wide);
-        stack[at] = (ebpo_visit)rays[lane] << 32 | b->child[lane];
-        f8_store(p->g->enter[at], enter[lane]);
+        stack[at] = (ebpo_visit)in[lane] << 32 | b->child[lane];
+        p->g->enter[at] = key[lane];
     }
     return top + (uint32_t)__builtin_popcount(found);
 }
 
 /* Walks through the accel with all rays. A visit on the stack has a bit for each ray that may enter
- * the child's box in place of the key; g->enter has the rays' keys. */
-static void packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack)
+ * the child's box in place of the key; g->enter has the key. Returns a bit for each ray of the
+ * group with candidates or a search. */
+static uint32_t packet_walk(ray_packet *p, const ebpo_accel *s, ebpo_visit *stack)
 {
-    uint32_t top = packet_node(p, s, stack, 0, s->root_bound);
+    uint32_t open = 0,
+             top = packet_node(p, s, stack, 0, s->root_bound, UINT32_MAX >> (32 - p->count));
     while (top) {
         ebpo_visit v = stack[--top];
-        uint32_t child = (uint32_t)v;
-        unsigned rays = (unsigned)(v >> 32) &
-                        f8_bits(f8_at_most(f8_load(p->g->enter[top]), f8_load(p->bounds)));
-        if (!rays)
-            continue;
+        uint32_t child = (uint32_t)v, rays = (uint32_t)(v >> 32);
         if (child & EBPO_IS_BLOCK)
-            packet_block(p, s, child & ~EBPO_IS_BLOCK, rays);
-        else if (rays & (rays - 1))
-            top = packet_node(p, s, stack, top, child);
+            packet_block(p, s, child & ~EBPO_IS_BLOCK, rays, p->g->enter[top]);
         else
-            packet_single(p, s, child, stack + top, (unsigned)__builtin_ctz(rays));
+            top = packet_node(p, s, stack, top, child, rays);
     }
     for (unsigned i = 0; i < p->count; i++) {
-        ebpo_ray_few *few = &p->g->few[p->first + i];
+        ebpo_ray_search *r = p->g->search[p->first + i];
         packet_drop_beyond(p, i, p->bounds[i]);
-        if (!p->search[i])
-            continue;
-        memcpy(p->search[i]->waiting, few->waiting, few->count * sizeof *few->waiting);
-        p->search[i]->count = (int)few->count;
-        few->count = 0;
+        open |= (uint32_t)(r || p->g->few[p->first + i]) << (p->first + i);
+        if (r)
+            packet_move_waiting(p, i, r);
     }
+    return open;
 }
 
 /* --- turns: several rays walked in turns --- */
@@ -1024,25 +1072,30 @@ EBPO_EIGHT bool ray_take_turn(ray_turn *w, bool wide, bool sorted)
 EBPO_EIGHT void ray_walk_in_turns(ebpo_ray_search *const *ray, unsigned count, ebpo_ray_group *g,
                                   bool wide, bool sorted)
 {
-    ray_turn turn[EBPO_RAY_GROUP];
-    for (unsigned i = 0; i < count; i++)
+    ray_turn turn[EBPO_RAY_TURNS];
+    unsigned next = count < EBPO_RAY_TURNS ? count : EBPO_RAY_TURNS, left = next;
+    for (unsigned i = 0; i < left; i++)
         turn[i] = (ray_turn){ ray[i], g->stack[i], 0, g->s->root_bound };
-    for (unsigned i = 0; count; i = i < count ? i : 0) {
+    for (unsigned i = 0; left; i = i < left ? i : 0) {
         if (ray_take_turn(&turn[i], wide, sorted)) {
             i++;
             continue;
         }
         drop_beyond(turn[i].r);
-        turn[i] = turn[--count];
+        if (next < count)
+            turn[i] = (ray_turn){ ray[next++], turn[i].stack, 0, g->s->root_bound };
+        else
+            turn[i] = turn[--left];
     }
 }
 
 /* --- a group of rays --- */
 
-/* Transforms rays to the frame as ray_search_begin (rays.c) does, and sets the bounds. No search is
- * begun: many rays of a picture miss all blocks. Returns false if ray_search_begin would move an
- * origin or scale a direction. */
-EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
+/* Transforms eight rays from `begin` to the frame as ray_search_begin (rays.c) does, and sets their
+ * bounds. No search is begun: many rays of a picture miss all blocks. Lanes after the last ray
+ * repeat the first of the eight. Returns false if ray_search_begin would move an origin or scale a
+ * direction. */
+EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f, unsigned begin, unsigned count)
 {
     const ebpo_accel *s = p->g->s;
     v4d far = v4d_all(0), beyond = v4d_all((double)EBPO_RAY_BEYOND), bound[2];
@@ -1050,16 +1103,16 @@ EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
     for (unsigned h = 0; h < 2; h++) {
         const ebpo_ray *ray[4];
         for (unsigned i = 0; i < 4; i++)
-            ray[i] = p->g->ray[p->first + (4 * h + i < p->count ? 4 * h + i : 0)];
+            ray[i] = p->g->ray[p->first + begin + (4 * h + i < count ? 4 * h + i : 0)];
         v4d longest = v4d_all(0);
         for (int k = 0; k < 3; k++) {
             v4d origin = { ray[0]->origin[k], ray[1]->origin[k], ray[2]->origin[k],
                            ray[3]->origin[k] },
                 d = { ray[0]->direction[k], ray[1]->direction[k], ray[2]->direction[k],
                       ray[3]->direction[k] };
-            f->direction[k][h] = d;
-            f->origin[k][h] = (origin - s->centre[k]) * s->scale;
-            far = v4d_max(v4d_abs(f->origin[k][h]), far);
+            f->direction[k][begin / 4 + h] = d;
+            f->origin[k][begin / 4 + h] = origin = (origin - s->centre[k]) * s->scale;
+            far = v4d_max(v4d_abs(origin), far);
             longest = v4d_max(v4d_abs(d), longest);
         }
         plain &= longest >= EBPO_RAY_SHORTEST;
@@ -1067,74 +1120,117 @@ EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f)
         v4d t = { ray[0]->t_max, ray[1]->t_max, ray[2]->t_max, ray[3]->t_max };
         bound[h] = v4d_min(t * s->scale * (1 + 0x1p-20) + 0x1p-90, beyond);
     }
-    memcpy(f->from, p->g->ray[p->first]->origin, sizeof f->from);
-    f8 bounds = f8_from_doubles(bound[0], bound[1]);
-    packet_set_bounds(p, f8_pick(f8_mask((1u << p->count) - 1), bounds, f8_all(-1)));
+    if (begin == 0)
+        memcpy(f->from, p->g->ray[p->first]->origin, sizeof f->from);
+    f8_store(p->bounds + begin, f8_from_doubles(bound[0], bound[1]));
     double farthest = v4d_greatest(far);
-    f->error = ebpo_ray_error(s, farthest);
+    f->error = greater_of(f->error, ebpo_ray_error(s, farthest));
     return v4l_mask(plain) == 15 && farthest <= EBPO_RAY_NEAR * s->largest_coordinate &&
            s->scale > 0 && s->scale < INFINITY;
 }
 
 /* Does the same as packet_read with searches, which the function begins. */
-static void packet_read_begun(ray_packet *p, packet_frame *f)
+static void packet_read_begun(ray_packet *p, packet_frame *f, unsigned begin, unsigned count)
 {
     const ebpo_ray_search *any = NULL;
-    for (unsigned i = 0; i < p->count; i++)
-        any = packet_search(p, i) ? p->search[i] : any;
-    f8 bounds = f8_all(-1); /* misses all boxes */
-    memset(f, 0, sizeof *f);
-    for (unsigned i = 0; i < 8; i++) {
-        const ebpo_ray_search *r = i < p->count ? p->search[i] : NULL;
-        bounds = r ? packet_with_bound(bounds, i, r->bound) : bounds;
+    for (unsigned i = begin; i < begin + count; i++) {
+        const ebpo_ray_search *r = packet_search(p, i);
+        any = r ? r : any;
+    }
+    for (unsigned i = begin; i < begin + 8; i++) {
+        const ebpo_ray_search *r = i < begin + count ? p->g->search[p->first + i] : NULL;
+        p->bounds[i] = r ? r->bound : -1; /* -1: misses all boxes */
         r = r ? r : any;
         if (i == 0 && r)
             memcpy(f->from, r->from, sizeof f->from);
-        for (int k = 0; k < 3 && r; k++) {
-            f->origin[k][i / 4][i % 4] = r->origin[k];
-            f->direction[k][i / 4][i % 4] = r->direction[k];
+        for (int k = 0; k < 3; k++) {
+            f->origin[k][i / 4][i % 4] = r ? r->origin[k] : 0;
+            f->direction[k][i / 4][i % 4] = r ? r->direction[k] : 0;
         }
         f->error = r && r->error > f->error ? r->error : f->error;
     }
-    packet_set_bounds(p, bounds);
 }
 
-/* Walks with the rays of a packet, if they are similar. Otherwise adds their searches to `other`.
- * An origin that is too far for the frame (set_error in rays.c) is unknown there, so its ray cannot
- * be compared with other rays. */
-static void ray_walk_packet(ray_packet *p, ebpo_ray_search **other, unsigned *others)
+/* Reads the longest run of similar rays from p->first. Returns false if the first ray has no
+ * similar neighbour. An origin that is too far for the frame (set_error in rays.c) is unknown
+ * there, so its ray cannot be compared with other rays. */
+static bool packet_read_run(ray_packet *p)
 {
     const ebpo_accel *s = p->g->s;
-    if (p->count > 1 && p->g->wants == EBPO_WANTS_FIRST && !(s->root_bound & EBPO_IS_BLOCK)) {
-        if (!packet_read(p, &p->frame))
-            packet_read_begun(p, &p->frame);
-        if (p->frame.error < (double)EBPO_RAY_BEYOND && packet_is_coherent(&p->frame, s)) {
-            packet_set(p);
-            packet_set_faces(p, s);
-            packet_walk(p, s, p->g->stack[0]);
-            return;
+    unsigned rest = p->g->count - p->first;
+    p->count = p->eights = 0;
+    p->frame.error = 0;
+    for (unsigned begin = 0; begin < rest; begin += 8) {
+        unsigned count = rest - begin < 8 ? rest - begin : 8;
+        double before = p->frame.error;
+        if (!packet_read(p, &p->frame, begin, count)) {
+            p->frame.error = before;
+            packet_read_begun(p, &p->frame, begin, count);
+        }
+        unsigned other = ~packet_similar(&p->frame, s, begin) | 1u << count,
+                 same = (unsigned)__builtin_ctz(other);
+        if (!(p->frame.error < (double)EBPO_RAY_BEYOND)) {
+            p->frame.error = before;
+            break;
+        }
+        if (same == 0)
+            break;
+        p->count = begin + same;
+        p->eights++;
+        if (same < 8) {
+            for (unsigned i = p->count; i < 8 * p->eights; i++) {
+                p->bounds[i] = -1;
+                for (int k = 0; k < 3; k++) {
+                    p->frame.origin[k][i / 4][i % 4] = p->frame.origin[k][0][0];
+                    p->frame.direction[k][i / 4][i % 4] = p->frame.direction[k][0][0];
+                }
+            }
+            break;
         }
     }
-    for (unsigned i = 0; i < p->count; i++)
-        if (packet_search(p, i))
-            other[(*others)++] = p->search[i];
+    return p->count > 1;
 }
 
-static void ray_walk_many(ebpo_ray_group *g)
+/* Walks with similar rays of the group, beginning with ray p->first. Adds searches of rays that are
+ * not similar to `other`. Adds a bit to *open for each ray that has candidates or a search. Returns
+ * the number of rays. */
+static unsigned ray_walk_packet(ray_packet *p, ebpo_ray_search **other, unsigned *others,
+                                uint32_t *open)
+{
+    ebpo_ray_group *g = p->g;
+    const ebpo_accel *s = g->s;
+    unsigned rest = g->count - p->first;
+    if (rest > 1 && !(s->root_bound & EBPO_IS_BLOCK)) {
+        if (bundle_misses(s, g->ray + p->first, rest))
+            return rest;
+        if (g->wants == EBPO_WANTS_FIRST && packet_read_run(p)) {
+            packet_set(p);
+            packet_set_faces(p, s);
+            *open |= packet_walk(p, s, g->stack[0]);
+            return p->count;
+        }
+    }
+    rest = rest < 8 ? rest : 8;
+    for (unsigned i = 0; i < rest; i++)
+        if (packet_search(p, i)) {
+            other[(*others)++] = g->search[p->first + i];
+            *open |= UINT32_C(1) << (p->first + i);
+        }
+    return rest;
+}
+
+static uint32_t ray_walk_many(ebpo_ray_group *g)
 {
     ebpo_ray_search *other[EBPO_RAY_GROUP];
     unsigned others = 0;
+    uint32_t open = 0;
     bool wide = g->s->wide, sorted = g->wants == EBPO_WANTS_FIRST;
-    for (unsigned i = 0; i < g->count; i++)
-        g->few[i].count = 0;
-    for (unsigned i = 0; i < g->count && g->s->bound_count; i += EBPO_RAY_PACKET) {
-        ray_packet p;
-        p.g = g;
-        p.first = i;
-        p.count = g->count - i < EBPO_RAY_PACKET ? g->count - i : EBPO_RAY_PACKET;
-        memset(p.search, 0, sizeof p.search);
-        ray_walk_packet(&p, other, &others);
-    }
+    ray_packet p;
+    p.g = g;
+    memset(g->search, 0, sizeof g->search);
+    memset(g->few, 0, sizeof g->few);
+    for (p.first = 0; p.first < g->count && g->s->bound_count;)
+        p.first += ray_walk_packet(&p, other, &others, &open);
     if (wide && sorted)
         ray_walk_in_turns(other, others, g, true, true);
     else if (wide)
@@ -1143,6 +1239,7 @@ static void ray_walk_many(ebpo_ray_group *g)
         ray_walk_in_turns(other, others, g, false, true);
     else
         ray_walk_in_turns(other, others, g, false, false);
+    return open;
 }
 
-const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many, ray_misses };
+const ebpo_ray_kernels EBPO_KERNEL(ebpo_ray_kernels) = { ray_walk, ray_walk_many };

@@ -636,7 +636,7 @@ ebpo_status ebpo_ray_all(ebpo_context *context, const double origin[3], const do
 /* Number of rays that a thread takes at a time. If the model is loaded in parts, the rays are
  * sorted along the Morton curve, and a thread takes more rays, because neighbours on the curve need
  * the same subtrees. */
-enum { RAYS_AT_A_TIME = 128, RAYS_ALONG_CURVE = 1024 };
+enum { RAYS_AT_A_TIME = 512, RAYS_ALONG_CURVE = 1024 };
 
 /* The hits of a ray, before they are gathered: hits[begin .. end - 1] in the context of a thread.
  */
@@ -742,8 +742,7 @@ typedef struct group {
     uint64_t index[EBPO_RAY_GROUP]; /* indices in the batch */
     casting c[EBPO_RAY_GROUP];
     ebpo_ray_search search[EBPO_RAY_GROUP];
-    ebpo_ray_search *begun[EBPO_RAY_GROUP]; /* NULL: the ray misses all faces */
-    ebpo_ray_found *found[EBPO_RAY_GROUP];  /* casting.found */
+    ebpo_ray_found *found[EBPO_RAY_GROUP]; /* casting.found */
     uint64_t capacity[EBPO_RAY_GROUP];
 } group;
 
@@ -754,9 +753,7 @@ static ebpo_ray_search *begin_of_group(void *user, unsigned i)
     begin_ray(g->b, g->index[i], g->worker, &g->c[i]);
     g->c[i].found = &g->found[i];
     g->c[i].capacity = &g->capacity[i];
-    if (begin_search(&g->c[i], &g->search[i], g->rays.s))
-        g->begun[i] = &g->search[i];
-    return g->begun[i];
+    return begin_search(&g->c[i], &g->search[i], g->rays.s) ? &g->search[i] : NULL;
 }
 
 static void add_to_group(group *g, uint64_t ray)
@@ -764,26 +761,25 @@ static void add_to_group(group *g, uint64_t ray)
     unsigned i = g->rays.count++;
     g->rays.ray[i] = &g->b->rays[ray];
     g->index[i] = ray;
-    g->begun[i] = NULL;
 }
 
 /* Returns the candidates of ray i of a group after walk_many. *count: their number. */
 static const ebpo_ray_candidate *candidates_of(const group *g, unsigned i, unsigned *count)
 {
-    const ebpo_ray_few *few = &g->rays.few[i];
-    *count = g->begun[i] ? (unsigned)g->begun[i]->count : few->count;
-    return g->begun[i] ? g->begun[i]->waiting : few->waiting;
+    const ebpo_ray_search *r = g->rays.search[i];
+    *count = r ? (unsigned)r->count : g->rays.few[i];
+    return r ? r->waiting : g->rays.candidate[i];
 }
 
 /* Tests the candidates of ray i of a group, and stores the result. */
 static ebpo_status end_ray(group *g, unsigned i, ebpo_error *error)
 {
-    const ebpo_ray_few *few = &g->rays.few[i];
+    unsigned few = g->rays.few[i];
     casting *c = &g->c[i];
-    ebpo_ray_search *r = g->begun[i];
-    if (!r && few->count && (r = begin_of_group(g, i))) {
-        memcpy(r->waiting, few->waiting, few->count * sizeof *few->waiting);
-        r->count = (int)few->count;
+    ebpo_ray_search *r = g->rays.search[i];
+    if (!r && few && (r = begin_of_group(g, i))) {
+        memcpy(r->waiting, g->rays.candidate[i], few * sizeof *r->waiting);
+        r->count = (int)few;
     }
     if (r)
         end_search(r);
@@ -845,24 +841,29 @@ static ebpo_status cast_group(group *g, ebpo_error *error)
     four f = { .count = 0 };
     unsigned count;
     ebpo_status status = EBPO_OK;
-    m->kernels.ray->walk_many(&g->rays);
+    uint32_t open = m->kernels.ray->walk_many(&g->rays),
+             all = UINT32_MAX >> (EBPO_RAY_GROUP - g->rays.count);
+    /* In a subset, rays that miss all faces may come through pruned nodes. */
+    if (m->info->pruned)
+        open = all;
+    for (uint32_t left = all & ~open; left && status == EBPO_OK; left &= left - 1)
+        status = store_miss(g->b, g->index[__builtin_ctz(left)], g->worker, error);
     /* Prefetches what the exact tests of candidates will read. (gcc omits calls of a separate
      * function, as it has no result.) */
-    for (unsigned i = 0; i < g->rays.count; i++) {
-        const ebpo_ray_candidate *c = candidates_of(g, i, &count);
+    for (uint32_t left = open; left; left &= left - 1) {
+        const ebpo_ray_candidate *c = candidates_of(g, (unsigned)__builtin_ctz(left), &count);
         for (unsigned k = 0; k < count; k++)
             ebpo_accel_fetch_face(s, ebpo_accel_slot_face(s, c[k].slot));
     }
-    for (unsigned i = 0; i < g->rays.count && status == EBPO_OK; i++) {
+    for (uint32_t left = open; left && status == EBPO_OK; left &= left - 1) {
+        unsigned i = (unsigned)__builtin_ctz(left);
         const ebpo_ray_candidate *c = candidates_of(g, i, &count);
-        bool decided = g->begun[i] && (g->c[i].count || g->c[i].done);
+        bool decided = g->rays.search[i] && (g->c[i].count || g->c[i].done);
         if (count == 1 && c->facing && g->rays.wants == EBPO_WANTS_FIRST && !decided &&
             !m->info->pruned) {
             f.candidate[f.count] = *c;
             f.ray[f.count++] = i;
             status = f.count == 4 ? end_four(g, &f, error) : EBPO_OK;
-        } else if (count == 0 && !g->begun[i] && !m->info->pruned) {
-            status = store_miss(g->b, g->index[i], g->worker, error);
         } else {
             status = end_ray(g, i, error);
         }
@@ -870,33 +871,14 @@ static ebpo_status cast_group(group *g, ebpo_error *error)
     return status == EBPO_OK && f.count ? end_four(g, &f, error) : status;
 }
 
-/* Finds the hits of the rays begin .. end - 1, in groups. */
-static ebpo_status cast_part(group *g, uint64_t begin, uint64_t end, ebpo_error *error)
-{
-    const batch *b = g->b;
-    const ebpo_model *m = b->context[g->worker]->model;
-    ebpo_status status = EBPO_OK;
-    /* In a subset, rays that miss all faces may come through pruned nodes. */
-    bool miss = end - begin > 1 && !b->options.done && !m->info->pruned &&
-                m->kernels.ray->misses(m->whole, b->rays + begin, (unsigned)(end - begin));
-    for (uint64_t i = begin; i < end && miss && status == EBPO_OK; i++)
-        status = store_miss(g->b, i, g->worker, error);
-    if (miss)
-        return status;
-    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
-        g->rays.count = 0;
-        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
-            if (!b->options.done || !b->options.done[i])
-                add_to_group(g, i);
-        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
-    }
-    return status;
-}
-
-/* Finds the hits of the rays begin .. end - 1 in a model that is completely in memory. */
+/* Finds the hits of the rays begin .. end - 1 in groups, in a model that is completely in memory.
+ * The rays are checked here, so that they are read from memory once. */
 static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned worker,
                                ebpo_error *error)
 {
+    ebpo_status status = ebpo_check_ray_rows(b->rays, begin, end, error);
+    if (status != EBPO_OK)
+        return status;
     group *g = ebpo_alloc(1, sizeof *g);
     if (!g)
         return ebpo_fail_memory(error, sizeof *g);
@@ -909,9 +891,13 @@ static ebpo_status cast_groups(batch *b, uint64_t begin, uint64_t end, unsigned 
     g->rays.user = g;
     memset(g->found, 0, sizeof g->found);
     memset(g->capacity, 0, sizeof g->capacity);
-    ebpo_status status = EBPO_OK;
-    for (uint64_t i = begin; i < end && status == EBPO_OK; i += EBPO_RAY_BUNDLE)
-        status = cast_part(g, i, end - i < EBPO_RAY_BUNDLE ? end : i + EBPO_RAY_BUNDLE, error);
+    for (uint64_t i = begin; i < end && status == EBPO_OK;) {
+        g->rays.count = 0;
+        for (; i < end && g->rays.count < EBPO_RAY_GROUP; i++)
+            if (!b->options.done || !b->options.done[i])
+                add_to_group(g, i);
+        status = g->rays.count ? cast_group(g, error) : EBPO_OK;
+    }
     for (unsigned i = 0; i < EBPO_RAY_GROUP; i++)
         free(g->found[i]);
     free(g);
@@ -1061,9 +1047,10 @@ static void put_in_order(batch *b, const ebpo_model *m)
 
 /* --- on all cores --- */
 
-ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t count, ebpo_error *error)
+ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t begin, uint64_t end,
+                                ebpo_error *error)
 {
-    for (uint64_t i = 0; i < count; i++) {
+    for (uint64_t i = begin; i < end; i++) {
         const char *fault = ray_fault(rays[i].origin, rays[i].direction, rays[i].t_max);
         if (fault)
             return ebpo_fail(error, EBPO_E_ARGUMENT, "ray %" PRIu64 " %s", i, fault);
@@ -1105,7 +1092,7 @@ static ebpo_status cast_all(batch *b, ebpo_context *context, const ebpo_ray_opti
     if (status == EBPO_OK && b->options.sides > EBPO_RAY_BACK)
         status = ebpo_fail_value(error);
     if (status == EBPO_OK)
-        status = ebpo_check_ray_rows(b->rays, b->count, error);
+        status = m->whole ? EBPO_OK : ebpo_check_ray_rows(b->rays, 0, b->count, error);
     if (status == EBPO_OK)
         status = ebpo_check_mesh(m, error);
     if (status == EBPO_OK && b->wants == EBPO_WANTS_ALL && b->options.done)

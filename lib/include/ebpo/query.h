@@ -788,12 +788,12 @@ typedef struct ebpo_ray {
  * other rays. If not everything is in memory, rays are processed in another order: the points at
  * which rays enter the model are sorted along a space-filling curve. So each subtree is loaded only
  * a few times. If the model is completely in memory, neighbours in `rays` with similar origins and
- * directions, such as rays through the pixels of a row, take about 0.7 times as long as single
+ * directions, such as rays through the pixels of a row, take about 0.5 times as long as single
  * calls, and other rays of large models about 0.6 times.
  *
- * EBPO_E_ARGUMENT: a ray is not valid; the message has its index, and no ray is computed. Other
- * errors are those of ebpo_ray_first, for the first failed ray in processing order. On failure
- * `out` is unspecified.
+ * EBPO_E_ARGUMENT: a ray is not valid; the message has its index. Rays before it may have been
+ * computed. Other errors are those of ebpo_ray_first, for the first failed ray in processing
+ * order. On failure `out` is unspecified.
  *
  * Threads: one at a time per context.
  */

@@ -56,11 +56,19 @@ static RTCScene make_scene(bench::mesh<float> &mesh)
     return scene;
 }
 
-static void cast_alone(RTCScene scene, const std::vector<ebpo_ray> &rays)
+// A result of Embree, as this library stores it, but without the side.
+static ebpo_ray_hit make_hit(float t, unsigned geometry, unsigned face)
+{
+    return { t, geometry == RTC_INVALID_GEOMETRY_ID ? EBPO_NO_FACE : face, 0 };
+}
+
+static void cast_alone(RTCScene scene, const std::vector<ebpo_ray> &rays,
+                       std::vector<ebpo_ray_hit> &out)
 {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    for (const ebpo_ray &from : rays) {
+    for (size_t i = 0; i < rays.size(); i++) {
+        const ebpo_ray &from = rays[i];
         RTCRayHit r = {};
         r.ray.org_x = (float)from.origin[0], r.ray.dir_x = (float)from.direction[0];
         r.ray.org_y = (float)from.origin[1], r.ray.dir_y = (float)from.direction[1];
@@ -69,10 +77,12 @@ static void cast_alone(RTCScene scene, const std::vector<ebpo_ray> &rays)
         r.ray.mask = ~0u;
         r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         rtcIntersect1(scene, &context, &r);
+        out[i] = make_hit(r.ray.tfar, r.hit.geomID, r.hit.primID);
     }
 }
 
-static void cast_packets(RTCScene scene, const std::vector<ebpo_ray> &rays)
+static void cast_packets(RTCScene scene, const std::vector<ebpo_ray> &rays,
+                         std::vector<ebpo_ray_hit> &out)
 {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -91,6 +101,8 @@ static void cast_packets(RTCScene scene, const std::vector<ebpo_ray> &rays)
             r.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
         }
         rtcIntersect8(valid, scene, &context, &r);
+        for (size_t i = 0; i < 8 && begin + i < rays.size(); i++)
+            out[begin + i] = make_hit(r.ray.tfar[i], r.hit.geomID[i], r.hit.primID[i]);
     }
 }
 
@@ -107,7 +119,7 @@ try {
     bench::mesh<float> mesh = bench::read_ply<float>(argv[2]);
     RTCScene scene = make_scene(mesh);
     const std::vector<ebpo_ray> rays = read_rays(argv[3]);
-    std::vector<ebpo_ray_hit> single(rays.size()), many(rays.size());
+    std::vector<ebpo_ray_hit> single(rays.size()), many(rays.size()), embree(rays.size());
     const std::function<void()> ways[] = {
         [&] {
             for (size_t i = 0; i < rays.size(); i++) {
@@ -124,8 +136,8 @@ try {
             check(ebpo_ray_first_many(context, rays.data(), rays.size(), &options, many.data(),
                                       &error));
         },
-        [&] { cast_alone(scene, rays); },
-        [&] { cast_packets(scene, rays); },
+        [&] { cast_alone(scene, rays, embree); },
+        [&] { cast_packets(scene, rays, embree); },
     };
     uint64_t least[4] = { UINT64_MAX, UINT64_MAX, UINT64_MAX, UINT64_MAX };
     for (int round = 0; round < atoi(argv[4]); round++)
