@@ -1,13 +1,13 @@
 /* Simplifies the triangles of a patch by collapsing edges in the order of their quadric error.
  *
  * The quadric of a vertex is a function of a position: the sum of the squared distances from the
- * planes of the vertex's triangles, weighted by area. A collapse moves a vertex onto a neighbour
- * and removes the triangles that have both vertices. The cost of a collapse is mainly the sum of
- * the quadrics of both vertices at the neighbour's position. For each edge with only one triangle,
- * the quadrics of its two vertices also have a plane that contains the edge and is perpendicular to
- * the triangle. These planes keep open borders in place. A corner is one of the three uses of a
- * vertex by a triangle: corner c is entry c of the array `triangle`. The corners of each vertex are
- * a circular list, and a collapse joins two lists. */
+ * planes of the vertex's triangles, weighted by area. A collapse replaces two neighbours by one
+ * vertex and removes the triangles that have both. The cost of a collapse is mainly the sum of the
+ * quadrics of both vertices at the new vertex, which is placed where this sum is small. For each
+ * edge with only one triangle, the quadrics of its two vertices also have a plane that contains the
+ * edge and is perpendicular to the triangle. These planes keep open borders in place. A corner is
+ * one of the three uses of a vertex by a triangle: corner c is entry c of the array `triangle`. The
+ * corners of each vertex are a circular list, and a collapse joins two lists. */
 #include "core/strict_fp.h"
 
 #include <inttypes.h>
@@ -24,9 +24,11 @@
  * each attempt walks along the lists. */
 enum { MOST_CORNERS = 512 };
 /* OPEN_WEIGHT: weight of the planes at open edges (edges with one triangle). LENGTH_WEIGHT: weight
- * of the squared length of an edge in the cost. LEAST_COSINE: least cosine between the normals of a
+ * of the squared length of an edge in the cost. PLACE_WEIGHT: weight of the squared distance of a
+ * new vertex from the middle of its edge. LEAST_COSINE: least cosine between the normals of a
  * triangle before and after a collapse. */
-static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, LEAST_COSINE = 0.25;
+static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, PLACE_WEIGHT = 1e-3,
+                    LEAST_COSINE = 0.25;
 
 /* Weighted sums over planes n . x + d = 0. nn: products of two coordinates of n; nd: n times d; dd:
  * d squared. Together they are a symmetric 4 x 4 matrix. area: sum of the areas of the vertex's
@@ -35,8 +37,8 @@ typedef struct quadric {
     double nn[6], nd[3], dd, area;
 } quadric;
 
-/* A collapse that may be done: vertex `from` moves onto vertex `to`. The candidate is valid while
- * simplifier.age of both vertices is equal to from_age and to_age. */
+/* A collapse that may be done: vertex `to` moves and replaces vertex `from`. The candidate is valid
+ * while simplifier.age of both vertices is equal to from_age and to_age. */
 typedef struct candidate {
     double cost;
     uint32_t from, to, from_age, to_age;
@@ -79,6 +81,34 @@ static void add_plane(quadric *q, const double n[3], double d, double weight)
     for (int k = 0; k < 3; k++)
         q->nd[k] += weight * n[k] * d;
     q->dd += weight * d * d;
+}
+
+static void add_quadric(quadric *to, const quadric *q)
+{
+    for (int i = 0; i < 6; i++)
+        to->nn[i] += q->nn[i];
+    for (int k = 0; k < 3; k++)
+        to->nd[k] += q->nd[k];
+    to->dd += q->dd;
+    to->area += q->area;
+}
+
+/* Sets `out` to the point at which a quadric, plus the weighted squared distance from `middle`, is
+ * least. The three linear equations are solved by the decomposition L D L^T of their symmetric
+ * matrix. */
+static void find_least(const quadric *q, const double middle[3], double out[3])
+{
+    const double *a = q->nn, weight = PLACE_WEIGHT * q->area;
+    double r[3] = { a[0] * middle[0] + a[1] * middle[1] + a[2] * middle[2] + q->nd[0],
+                    a[1] * middle[0] + a[3] * middle[1] + a[4] * middle[2] + q->nd[1],
+                    a[2] * middle[0] + a[4] * middle[1] + a[5] * middle[2] + q->nd[2] };
+    double d0 = a[0] + weight, l1 = a[1] / d0, l2 = a[2] / d0, d1 = a[3] + weight - l1 * a[1],
+           m = a[4] - l1 * a[2], l3 = m / d1, d2 = a[5] + weight - l2 * a[2] - l3 * m;
+    double y1 = r[1] - l1 * r[0], y2 = r[2] - l2 * r[0] - l3 * y1, z = y2 / d2,
+           y = y1 / d1 - l3 * z, x = r[0] / d0 - l1 * y - l2 * z;
+    out[0] = middle[0] - x;
+    out[1] = middle[1] - y;
+    out[2] = middle[2] - z;
 }
 
 /* Returns the sum of the weighted squared distances of p from the planes of a quadric. */
@@ -196,17 +226,38 @@ static candidate pop_candidate(simplifier *s)
     return top;
 }
 
-/* Adds the collapse of vertex `from` onto vertex `to` to the heap. Does nothing if `from` is fixed.
- */
+/* Sets `out` to the position of the vertex that replaces `from` and `to`: the position of `to` if
+ * it is fixed, otherwise the point with the least quadrics near the middle of the edge. Returns the
+ * sum of both quadrics at this point. */
+static double place_vertex(const simplifier *s, uint32_t from, uint32_t to, double out[3])
+{
+    const double *p = position_of(s, from), *q = position_of(s, to);
+    quadric sum = s->sum[from];
+    double middle[3];
+    add_quadric(&sum, &s->sum[to]);
+    memcpy(out, q, sizeof middle);
+    if (!s->mesh->vertex[to].fixed && sum.area > 0) {
+        for (int k = 0; k < 3; k++)
+            middle[k] = (p[k] + q[k]) / 2;
+        find_least(&sum, middle, out);
+    }
+    return quadric_value(&sum, out);
+}
+
+/* Adds the collapse of an edge to the heap. Does nothing if both vertices are fixed. */
 static void offer_collapse(simplifier *s, uint32_t from, uint32_t to)
 {
+    double at[3], edge[3];
+    if (s->mesh->vertex[from].fixed) {
+        uint32_t other = from;
+        from = to;
+        to = other;
+    }
     if (s->mesh->vertex[from].fixed)
         return;
-    double edge[3];
     ebpo_vec3_subtract(position_of(s, to), position_of(s, from), edge);
-    double cost = quadric_value(&s->sum[from], position_of(s, to)) +
-                  quadric_value(&s->sum[to], position_of(s, to)) +
-                  LENGTH_WEIGHT * s->sum[from].area * ebpo_vec3_dot(edge, edge);
+    double cost = place_vertex(s, from, to, at) +
+                  LENGTH_WEIGHT * ebpo_vec3_dot(edge, edge) * (s->sum[from].area + s->sum[to].area);
     push_candidate(s, (candidate){ cost, from, to, s->age[from], s->age[to] });
 }
 
@@ -249,7 +300,6 @@ static void offer_edges(simplifier *s, uint32_t v, bool upwards)
                 continue;
             s->mark[w] = s->marks;
             offer_collapse(s, v, w);
-            offer_collapse(s, w, v);
         }
         c = s->next[c];
     } while (c != s->head[v]);
@@ -269,58 +319,79 @@ static void mark_neighbours(simplifier *s, uint32_t v)
     } while (c != s->head[v]);
 }
 
-/* Returns true if the triangle is not flipped when its vertex `from` moves to `to`. */
-static bool stays_unflipped(const simplifier *s, const uint32_t t[3], uint32_t from, uint32_t to)
+/* Returns true if no triangle of vertex v without vertex `other` is flipped when v moves to `at`.
+ */
+static bool stays_unflipped(const simplifier *s, uint32_t v, uint32_t other, const double at[3])
 {
-    const double *p[3], *q[3];
-    double before[3], after[3];
-    for (int k = 0; k < 3; k++) {
-        p[k] = position_of(s, t[k]);
-        q[k] = t[k] == from ? position_of(s, to) : p[k];
-    }
-    cross_of(p[0], p[1], p[2], before);
-    cross_of(q[0], q[1], q[2], after);
-    double square = ebpo_vec3_dot(before, before) * ebpo_vec3_dot(after, after),
-           dot = ebpo_vec3_dot(before, after);
-    return !(ebpo_vec3_dot(before, before) > 0) || dot > LEAST_COSINE * sqrt(square);
+    uint32_t c = s->head[v];
+    do {
+        const uint32_t *t = s->mesh->triangle + c / 3 * 3;
+        if (!s->dead[c / 3] && t[0] != other && t[1] != other && t[2] != other) {
+            const double *p[3], *q[3];
+            double before[3], after[3];
+            for (int k = 0; k < 3; k++) {
+                p[k] = position_of(s, t[k]);
+                q[k] = t[k] == v ? at : p[k];
+            }
+            cross_of(p[0], p[1], p[2], before);
+            cross_of(q[0], q[1], q[2], after);
+            double square = ebpo_vec3_dot(before, before);
+            if (square > 0 && !(ebpo_vec3_dot(before, after) >
+                                LEAST_COSINE * sqrt(square * ebpo_vec3_dot(after, after))))
+                return false;
+        }
+        c = s->next[c];
+    } while (c != s->head[v]);
+    return true;
 }
 
-/* Returns true if the collapse of `from` onto `to` flips no triangle and does not change the
- * topology. The topology stays the same if each common neighbour of `from` and `to` is a vertex of
- * a triangle that has both. */
-static bool is_possible(simplifier *s, uint32_t from, uint32_t to)
+/* Returns true if the vertex has an edge with one triangle. */
+static bool is_open(const simplifier *s, uint32_t v)
+{
+    uint32_t c = s->head[v];
+    do {
+        for (int k = 0; k < 3 && !s->dead[c / 3]; k++) {
+            uint32_t w = s->mesh->triangle[c / 3 * 3 + (uint32_t)k];
+            if (w != v && count_shared(s, v, w) == 1)
+                return true;
+        }
+        c = s->next[c];
+    } while (c != s->head[v]);
+    return false;
+}
+
+/* Returns true if the collapse of `from` and `to` to the point `at` flips no triangle and does not
+ * change the topology. The topology stays the same if each common neighbour of `from` and `to` is a
+ * vertex of a triangle that has both, and if the edge is open or one of its vertices is not. */
+static bool is_possible(simplifier *s, uint32_t from, uint32_t to, const double at[3])
 {
     /* shared: number of triangles that have `from` and `to`; common: number of common neighbours */
     unsigned shared = 0, common = 0;
-    bool open = false;
     if ((uint64_t)s->corners[from] + s->corners[to] > MOST_CORNERS)
         return false;
     mark_neighbours(s, to);
     uint32_t to_mark = s->marks, seen_mark = ++s->marks, c = s->head[from];
     do {
         const uint32_t *t = s->mesh->triangle + c / 3 * 3;
-        bool has_to = t[0] == to || t[1] == to || t[2] == to;
         if (!s->dead[c / 3]) {
-            shared += has_to;
-            if (!has_to && !stays_unflipped(s, t, from, to))
-                return false;
+            shared += t[0] == to || t[1] == to || t[2] == to;
             for (int k = 0; k < 3; k++) {
                 uint32_t w = t[k];
-                if (w == from || w == to)
+                if (w == from || w == to || s->mark[w] != to_mark)
                     continue;
-                common += s->mark[w] == to_mark;
-                if (s->mark[w] != seen_mark)
-                    open = open || count_shared(s, from, w) == 1;
-                s->mark[w] = s->mark[w] == to_mark ? seen_mark : s->mark[w];
+                common++;
+                s->mark[w] = seen_mark;
             }
         }
         c = s->next[c];
     } while (c != s->head[from]);
-    return shared > 0 && common == shared && (!open || shared == 1);
+    return shared > 0 && common == shared && stays_unflipped(s, from, to, at) &&
+           (s->mesh->vertex[to].fixed || stays_unflipped(s, to, from, at)) &&
+           (shared == 1 || !is_open(s, from) || !is_open(s, to));
 }
 
-/* Moves vertex `from` onto `to`. */
-static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
+/* Replaces `from` and `to` by `to` at the point `at`. */
+static void collapse_edge(simplifier *s, uint32_t from, uint32_t to, const double at[3])
 {
     ebpo_patch_vertex *u = &s->mesh->vertex[from], *v = &s->mesh->vertex[to];
     uint32_t c = s->head[from];
@@ -338,18 +409,14 @@ static void collapse_edge(simplifier *s, uint32_t from, uint32_t to)
     s->next[s->head[from]] = after;
     s->head[from] = NONE;
     remove_dead_corners(s, to);
-    for (int k = 0; k < 3; k++)
-        s->sum[to].nd[k] += s->sum[from].nd[k];
+    add_quadric(&s->sum[to], &s->sum[from]);
+    memcpy(v->at, at, sizeof v->at);
     /* neighbouring patches need equal normals and colours of vertices that they share */
     for (int k = 0; k < 3 && !v->fixed; k++) {
         v->normal[k] += u->normal[k];
         v->colour[k] += u->colour[k];
     }
     v->weight += v->fixed ? 0 : u->weight;
-    for (int i = 0; i < 6; i++)
-        s->sum[to].nn[i] += s->sum[from].nn[i];
-    s->sum[to].dd += s->sum[from].dd;
-    s->sum[to].area += s->sum[from].area;
     s->age[from]++;
     s->age[to]++;
 }
@@ -381,8 +448,8 @@ static void compact_mesh(simplifier *s, uint32_t *new_index)
     m->vertex_count = vertices;
 }
 
-/* Makes the lists, quadrics and candidates, and collapses edges until `target` triangles remain. */
-static void collapse_edges(simplifier *s, uint64_t target)
+/* Makes the lists, quadrics and candidates, and collapses edges. */
+static void collapse_edges(simplifier *s, uint64_t target, double fine)
 {
     ebpo_patch_mesh *m = s->mesh;
     for (uint64_t v = 0; v < m->vertex_count; v++)
@@ -399,17 +466,24 @@ static void collapse_edges(simplifier *s, uint64_t target)
         add_triangle(s, t);
     for (uint32_t v = 0; v < m->vertex_count; v++)
         offer_edges(s, v, true);
-    while (s->alive > target && s->heap_count && !s->short_of_memory) {
+    while (s->heap_count && !s->short_of_memory) {
         candidate c = pop_candidate(s);
+        double at[3];
         if (s->age[c.from] != c.from_age || s->age[c.to] != c.to_age || s->head[c.from] == NONE ||
-            s->head[c.to] == NONE || !is_possible(s, c.from, c.to))
+            s->head[c.to] == NONE)
             continue;
-        collapse_edge(s, c.from, c.to);
+        double most = fine * fine * (s->sum[c.from].area + s->sum[c.to].area);
+        if (s->alive <= target && c.cost > most)
+            continue;
+        (void)place_vertex(s, c.from, c.to, at);
+        if (!is_possible(s, c.from, c.to, at))
+            continue;
+        collapse_edge(s, c.from, c.to, at);
         offer_edges(s, c.to, false);
     }
 }
 
-ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *error)
+ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, double fine, ebpo_error *error)
 {
     uint64_t vertices = mesh->vertex_count, triangles = mesh->triangle_count;
     if (triangles > UINT32_MAX / 3)
@@ -428,7 +502,7 @@ ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, ebpo_error *er
     s.dead = ebpo_alloc_zero(triangles, sizeof *s.dead);
     bool made = s.sum && s.next && s.head && s.corners && s.age && s.mark && s.dead;
     if (made) {
-        collapse_edges(&s, target);
+        collapse_edges(&s, target, fine);
         compact_mesh(&s, s.head);
     }
     free(s.sum);

@@ -5,7 +5,8 @@
  * The faces that are new below a node (no earlier leaf lists them) are a range of the model's
  * faces. If there are no patches below a node, the node's patch is made from these faces; otherwise
  * it is made from the patches of the node's children. Each patch has about a quarter as many
- * triangles as the faces or patches that it is made from.
+ * triangles as the faces or patches that it is made from, or fewer if the grid of its points does
+ * not show the difference.
  *
  * A vertex is on the border of a patch if faces that do not belong to the patch also use the
  * vertex. Each border vertex is replaced by the vertex of its cell. Its cell is the cell that
@@ -652,12 +653,19 @@ static ebpo_status encode_rows(const surface_builder *b, patch_node *node, const
     return status;
 }
 
+/* Returns half a step of the grid of a node's patch. Rounding to the grid changes the patch by
+ * about as much. */
+static double fine_of(const patch_node *node)
+{
+    return ldexp(1, -node->cell.level - EBPO_PATCH_GRID - 1);
+}
+
 /* Sets the error of a node's patch. `from`: the surface from which the patch was made. `before`:
  * the error of this surface. */
 static ebpo_status bound_error(const surface_builder *b, patch_node *node,
                                const ebpo_patch_mesh *from, double before, ebpo_error *error)
 {
-    double fine = ldexp(1, -node->cell.level - EBPO_PATCH_GRID - 1), there = 0, back = 0,
+    double fine = fine_of(node), there = 0, back = 0,
            greatest = 0; /* greatest: the greatest absolute coordinate of the box */
     ebpo_status status = ebpo_bound_distance(from, &node->mesh, fine, 0, &back, error);
     if (status == EBPO_OK)
@@ -717,7 +725,7 @@ static ebpo_status make_patch(surface_builder *b, patch_node *node, ebpo_error *
     if (!gather_surface(b, node, &from, &before) || !snap_border(b, node, &from, &node->mesh))
         status = ebpo_fail_memory(error, from.vertex_count * sizeof *from.vertex);
     if (status == EBPO_OK)
-        status = ebpo_simplify(&node->mesh, from.triangle_count / REDUCTION, error);
+        status = ebpo_simplify(&node->mesh, from.triangle_count / REDUCTION, fine_of(node), error);
     if (status == EBPO_OK && !add_collapsed_children(b, node, &from))
         status = ebpo_fail_memory(error, from.triangle_count * 3 * sizeof *from.triangle);
     uint64_t vertices = node->mesh.vertex_count;

@@ -41,7 +41,7 @@ enum {
     PRISM_CUTS = 20,
     SAMPLED = 8,
     MOST_VISITS = 4096,
-    STEPS = 2048,
+    STEPS = 256,
     MORE_PARTS = 1 << 19
 };
 /* allowed ratio of the bound and the greatest distance of a point that was found */

@@ -97,21 +97,23 @@ static ebpo_status end_file(const tiler *t, FILE *f, int file, ebpo_error *error
     return ebpo_fail_errno(error, t->job->path, "could not be written");
 }
 
-/* Writes a tile with the geometry and colours of `patch`, and with the grid and name of `surface`.
+/* Writes a tile with the geometry and colours of `mesh`, and with the grid and name of `surface`.
  * Sets the bounds of the tile. Adds the greatest rounding error of a vertex to the error of the
  * tile. */
-static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_patch *patch,
+static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_surface_mesh *mesh,
                               tile *out, ebpo_error *error)
 {
+    static const uint32_t point[3] = { 0, 0, 0 }; /* the triangle of a patch that is a point */
     char name[40];
     ebpo_gltf_written written;
-    surface->vertex_count = patch->vertex_count;
-    surface->triangle_count = patch->triangle_count;
-    surface->triangles = patch->triangles;
-    surface->xyz = patch->xyz;
-    surface->normals = patch->normals;
-    surface->colours = patch->colours;
-    surface->colour_bytes = 3;
+    bool is_point = mesh->mesh.face_count == 0;
+    surface->vertex_count = mesh->mesh.vertex_count;
+    surface->triangle_count = is_point ? 1 : mesh->mesh.face_count;
+    surface->triangles = is_point ? point : mesh->mesh.faces;
+    surface->xyz = mesh->mesh.xyz64;
+    surface->normals = mesh->normals;
+    surface->colours = mesh->colours.vertex;
+    surface->colour_bytes = 4;
     surface->rotates = true;
     memcpy(surface->origin, t->origin, sizeof t->origin);
     out->number = t->files++;
@@ -138,20 +140,21 @@ static ebpo_status write_tile(tiler *t, ebpo_gltf_surface *surface, const ebpo_p
 
 static ebpo_status write_patch(tiler *t, uint64_t i, ebpo_error *error)
 {
-    ebpo_patch patch = EBPO_PATCH_INIT;
+    ebpo_surface_mesh mesh = { 0 };
     ebpo_gltf_surface surface = { .name = "patch" };
-    ebpo_status status = ebpo_patch_read(&t->table, t->chunks, i, &patch, error);
+    int level = ebpo_octcode_level(t->table.row[EBPO_PATCH_COLUMNS * i + EBPO_PATCH_OCTCODE]);
+    ebpo_status status = ebpo_table_join(&t->table, t->chunks, &i, 1, NULL, &mesh, error);
     if (status != EBPO_OK)
         return status;
     for (int k = 0; k < 3; k++) { /* uses the grid of the patch, so that no vertex moves */
-        surface.step[k] = ldexp(t->info->box_size[k], -patch.level - EBPO_PATCH_GRID);
+        surface.step[k] = ldexp(t->info->box_size[k], -level - EBPO_PATCH_GRID);
         surface.grid[k] = t->info->box_origin[k];
     }
-    t->patch[i].error = patch.error;
-    status = write_tile(t, &surface, &patch, &t->patch[i], error);
-    if (patch.colours)
+    t->patch[i].error = mesh.error;
+    status = write_tile(t, &surface, &mesh, &t->patch[i], error);
+    if (mesh.colours.vertex)
         t->job->report->vertex_colours = EBPO_EXPORT_WRITTEN;
-    ebpo_patch_free(&patch);
+    ebpo_surface_mesh_free(&mesh);
     return status;
 }
 
@@ -169,11 +172,15 @@ static bool has_faces(const tiler *t, uint64_t i)
 static ebpo_status write_faces(tiler *t, uint64_t i, ebpo_error *error)
 {
     ebpo_patch faces = EBPO_PATCH_INIT;
+    ebpo_surface_mesh mesh = { 0 };
     ebpo_gltf_surface surface = { .name = "faces" };
     ebpo_status status = ebpo_patch_faces_read(&t->table, t->chunks, &i, 1, &faces, error);
     if (status == EBPO_OK)
-        status = write_tile(t, &surface, &faces, &t->faces[i], error);
+        status = ebpo_table_join(&t->table, t->chunks, NULL, 0, &faces, &mesh, error);
+    if (status == EBPO_OK)
+        status = write_tile(t, &surface, &mesh, &t->faces[i], error);
     ebpo_patch_free(&faces);
+    ebpo_surface_mesh_free(&mesh);
     return status;
 }
 

@@ -2,9 +2,7 @@
  * surface approximates the faces below a node (format/surface_patches.h).
  *
  * All faces at a vertex of the model share one vertex of the result. Its normal is the mean of the
- * normals of these faces, weighted by area. If a face's normal differs from the mean by more than
- * 40 degrees, the face gets a separate vertex with the face's normal at this corner. This keeps the
- * edges of machined parts sharp. */
+ * normals of these faces, weighted by area. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -21,8 +19,6 @@
 
 #define NONE UINT32_MAX
 
-static const double LEAST_COSINE = 0.766; /* cosine of 40 degrees */
-
 typedef struct faces_reader {
     ebpo_chunks *chunks;
     ebpo_patch *out;  /* the faces as a patch */
@@ -30,11 +26,10 @@ typedef struct faces_reader {
     uint32_t *face;   /* [count] indices of the faces in the file */
     uint32_t *corner; /* [count][3] indices in the file of the faces' vertices */
     uint32_t *vertex; /* [out->vertex_count] index in the file of each shared vertex */
-    /* [count] area vectors of faces: a normal whose length is twice the face's area; the unit is
-     * that of add_normals */
-    double (*normal)[3];
-    double (*sum)[3]; /* [out->vertex_count] sums of the area vectors around a vertex */
-    uint8_t *colour;  /* [count][3][3] red, green, blue of each corner; NULL: no colours */
+    /* [out->vertex_count] sum of the area vectors of the faces at a vertex: normals whose length is
+     * twice the face's area */
+    double (*sum)[3];
+    uint8_t *colour; /* [count][3][3] red, green, blue of each corner; NULL: no colours */
 } faces_reader;
 
 /* Makes the shared vertices, in the order of their first use by a face, and sets the triangles.
@@ -76,7 +71,7 @@ static ebpo_status read_positions(faces_reader *r, ebpo_error *error)
     return status;
 }
 
-/* Computes the area vectors of the faces and their sums at the shared vertices. The unit of length
+/* Adds the area vectors of the faces at the vertices. The unit of length
  * is a power of two near the size of the model, so that products neither overflow nor underflow. */
 static void add_normals(faces_reader *r)
 {
@@ -86,17 +81,17 @@ static void add_normals(faces_reader *r)
     for (uint64_t f = 0; f < r->count; f++) {
         const uint32_t *t = r->out->triangles + 3 * f;
         const double *p[3];
-        double u[3], v[3];
+        double u[3], v[3], n[3];
         for (int k = 0; k < 3; k++)
             p[k] = r->out->xyz + 3 * (uint64_t)t[k];
         for (int k = 0; k < 3; k++) {
             u[k] = ldexp(p[1][k] - p[0][k], -exponent);
             v[k] = ldexp(p[2][k] - p[0][k], -exponent);
         }
-        ebpo_vec3_cross(u, v, r->normal[f]);
+        ebpo_vec3_cross(u, v, n);
         for (int i = 0; i < 3; i++)
             for (int k = 0; k < 3; k++)
-                r->sum[t[i]][k] += r->normal[f][k];
+                r->sum[t[i]][k] += n[k];
     }
 }
 
@@ -112,29 +107,14 @@ static void set_unit(const double n[3], float out[3])
         out[k] = (float)(scaled[k] / length);
 }
 
-/* Sets the vertex of each corner of a face: the shared vertex, or a separate vertex with the face's
- * normal. */
+/* Sets the normals and colours of vertices. */
 static void set_vertices(faces_reader *r)
 {
     ebpo_patch *out = r->out;
-    uint64_t shared = out->vertex_count;
-    for (uint64_t v = 0; v < shared; v++)
+    for (uint64_t v = 0; v < out->vertex_count; v++)
         set_unit(r->sum[v], out->normals + 3 * v);
-    for (uint64_t i = 0; i < 3 * r->count; i++) {
-        uint64_t v = out->triangles[i];
-        float face_normal[3];
-        set_unit(r->normal[i / 3], face_normal);
-        const float *mean = out->normals + 3 * v;
-        if ((double)(face_normal[0] * mean[0] + face_normal[1] * mean[1] +
-                     face_normal[2] * mean[2]) < LEAST_COSINE) {
-            uint64_t separate = out->vertex_count++;
-            memcpy(out->xyz + 3 * separate, out->xyz + 3 * v, 3 * sizeof *out->xyz);
-            memcpy(out->normals + 3 * separate, face_normal, sizeof face_normal);
-            out->triangles[i] = (uint32_t)separate;
-        }
-        if (r->colour)
-            memcpy(out->colours + 3 * (uint64_t)out->triangles[i], r->colour + 3 * i, 3);
-    }
+    for (uint64_t i = 0; i < 3 * r->count && r->colour; i++)
+        memcpy(out->colours + 3 * (uint64_t)out->triangles[i], r->colour + 3 * i, 3);
 }
 
 static ebpo_status read_colours(faces_reader *r, ebpo_error *error)
@@ -145,7 +125,7 @@ static ebpo_status read_colours(faces_reader *r, ebpo_error *error)
     ebpo_status status = ebpo_face_colours_find(r->chunks->file, &colours, error);
     if (status == EBPO_OK && colours.element) {
         r->colour = ebpo_alloc(r->count, 9);
-        r->out->colours = ebpo_alloc(6 * r->count, 3);
+        r->out->colours = ebpo_alloc(3 * r->count, 3);
         status = r->colour && r->out->colours
                      ? ebpo_face_colours_read(&colours, r->chunks, r->face, r->corner, r->count,
                                               r->colour, error)
@@ -191,16 +171,14 @@ ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *ch
     r.face = ebpo_alloc(r.count, sizeof *r.face);
     r.corner = ebpo_alloc(3 * r.count, sizeof *r.corner);
     r.vertex = ebpo_alloc(3 * r.count, sizeof *r.vertex);
-    r.normal = ebpo_alloc(r.count, sizeof *r.normal);
     r.sum = ebpo_alloc_zero(3 * r.count, sizeof *r.sum);
-    /* there are at most 3 * count shared vertices and 3 * count separate vertices */
-    out->xyz = ebpo_alloc(6 * r.count, 3 * sizeof *out->xyz);
-    out->normals = ebpo_alloc(6 * r.count, 3 * sizeof *out->normals);
+    out->xyz = ebpo_alloc(3 * r.count, 3 * sizeof *out->xyz);
+    out->normals = ebpo_alloc(3 * r.count, 3 * sizeof *out->normals);
     out->triangles = ebpo_alloc(3 * r.count, sizeof *out->triangles);
     ebpo_status status = EBPO_OK;
-    if (!r.face || !r.corner || !r.vertex || !r.normal || !r.sum || !out->xyz || !out->normals ||
+    if (!r.face || !r.corner || !r.vertex || !r.sum || !out->xyz || !out->normals ||
         !out->triangles)
-        status = ebpo_fail_memory(error, 360 * r.count); /* about the sum of the sizes above */
+        status = ebpo_fail_memory(error, 220 * r.count); /* about the sum of the sizes above */
     for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
         const uint64_t *row = table->row + EBPO_PATCH_COLUMNS * patches[i];
         for (uint64_t k = 0; k < row[EBPO_PATCH_FACES]; k++)
@@ -211,7 +189,6 @@ ebpo_status ebpo_patch_faces_read(const ebpo_patch_table *table, ebpo_chunks *ch
     free(r.face);
     free(r.corner);
     free(r.vertex);
-    free(r.normal);
     free(r.sum);
     free(r.colour);
     if (status != EBPO_OK)

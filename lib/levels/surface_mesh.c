@@ -8,7 +8,10 @@
  * a vertex of a coarser patch, the search ends, and the cell's vertex replaces the vertex of the
  * finer patch. On a common border, the coarser patch has a vertex in each border cell that contains
  * a vertex of the model. So both patches get the same vertices. Vertices of the model's faces are
- * replaced in the same way. Source: format-spec/surface.md. */
+ * replaced in the same way. Source: format-spec/surface.md.
+ *
+ * At a crease, the normal of a vertex would light the triangles of all sides alike. So a vertex is
+ * repeated, once for each side, with the mean normal of the triangles on this side. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -23,9 +26,13 @@
 #include "core/hash.h"
 #include "format/surface_patches.h"
 #include "geometry/cells.h"
+#include "geometry/vec3.h"
 #include "levels/surface_mesh.h"
 
 #define NONE UINT32_MAX
+
+/* cosine of 30 degrees: greatest angle between triangles that share a normal at a crease */
+static const double LEAST_COSINE = 0.866;
 
 typedef struct joiner {
     const ebpo_patch_reader *reader;
@@ -174,6 +181,136 @@ static ebpo_status join_faces(joiner *j, const ebpo_patch *faces, ebpo_error *er
     return EBPO_OK;
 }
 
+/* Computes the normal of a triangle, in proportion to its area. The unit of length is a power of
+ * two near the size of the model, so that products neither overflow nor underflow. */
+static void area_normal(const joiner *j, const uint32_t t[3], double out[3])
+{
+    const double *xyz = j->out->mesh.xyz64;
+    int exponent;
+    double u[3], v[3];
+    (void)frexp(fmax(j->box.size[0], fmax(j->box.size[1], j->box.size[2])), &exponent);
+    ebpo_vec3_subtract(xyz + 3 * (uint64_t)t[1], xyz + 3 * (uint64_t)t[0], u);
+    ebpo_vec3_subtract(xyz + 3 * (uint64_t)t[2], xyz + 3 * (uint64_t)t[0], v);
+    for (int k = 0; k < 3; k++) {
+        u[k] = ldexp(u[k], -exponent);
+        v[k] = ldexp(v[k], -exponent);
+    }
+    ebpo_vec3_cross(u, v, out);
+}
+
+/* Returns true if the triangle with normal n, of any length, is on the side of a crease with this
+ * unit normal. */
+static bool is_on_side(const double n[3], const float normal[3])
+{
+    double m[3] = { (double)normal[0], (double)normal[1], (double)normal[2] };
+    return ebpo_vec3_dot(n, m) >= LEAST_COSINE * ebpo_vec3_length(n);
+}
+
+/* The vertices at creases. */
+typedef struct sides {
+    double (*sum)[3]; /* [vertices] sum of the normals of the triangles on the vertex's side */
+    uint32_t *next;   /* [vertices] the same vertex for the next side, or NONE */
+    bool *sharp;      /* [vertices] the vertex is at a crease */
+} sides;
+
+/* Returns the vertex that replaces v for a triangle with normal n; adds the vertex if needed. A
+ * side first has the normal of its first triangle. */
+static uint32_t find_side(joiner *j, const sides *s, uint32_t v, const double n[3])
+{
+    ebpo_surface_mesh *out = j->out;
+    double length = ebpo_vec3_length(n);
+    uint32_t side = v, last = NONE;
+    while (side != NONE && ebpo_vec3_length(s->sum[side]) > 0 &&
+           !is_on_side(n, out->normals + 3 * (uint64_t)side)) {
+        last = side;
+        side = s->next[side];
+    }
+    if (side == NONE) {
+        side = s->next[last] = (uint32_t)j->vertices++;
+        memcpy(out->mesh.xyz64 + 3 * (uint64_t)side, out->mesh.xyz64 + 3 * (uint64_t)v,
+               3 * sizeof *out->mesh.xyz64);
+        if (out->colours.vertex)
+            memcpy(out->colours.vertex + 4 * (uint64_t)side, out->colours.vertex + 4 * (uint64_t)v,
+                   4);
+        s->next[side] = NONE;
+        s->sharp[side] = true;
+        memset(s->sum[side], 0, sizeof *s->sum);
+    }
+    if (!(ebpo_vec3_length(s->sum[side]) > 0))
+        for (int k = 0; k < 3; k++)
+            out->normals[3 * (uint64_t)side + (uint64_t)k] = (float)(n[k] / length);
+    for (int k = 0; k < 3; k++)
+        s->sum[side][k] += n[k];
+    return side;
+}
+
+/* Repeats the vertices at creases. `s` has space for each corner at such a vertex. */
+static void separate_sides(joiner *j, const sides *s)
+{
+    double n[3];
+    for (uint64_t c = 0; c < 3 * j->triangles; c++) {
+        uint32_t *corner = j->out->mesh.faces + c;
+        if (!s->sharp[*corner])
+            continue;
+        area_normal(j, j->out->mesh.faces + c / 3 * 3, n);
+        if (ebpo_vec3_length(n) > 0)
+            *corner = find_side(j, s, *corner, n);
+    }
+    for (uint64_t v = 0; v < j->vertices; v++) {
+        double length = s->sharp[v] ? ebpo_vec3_length(s->sum[v]) : 0;
+        for (int k = 0; k < 3 && length > 0; k++)
+            j->out->normals[3 * v + (uint64_t)k] = (float)(s->sum[v][k] / length);
+    }
+}
+
+/* Marks the vertices at creases. Returns the number of corners of triangles at these vertices. */
+static uint64_t mark_creases(const joiner *j, bool *sharp)
+{
+    const uint32_t *corner = j->out->mesh.faces;
+    uint64_t count = 0;
+    double n[3];
+    for (uint64_t c = 0; c < 3 * j->triangles; c++) {
+        if (c % 3 == 0)
+            area_normal(j, corner + c, n);
+        sharp[corner[c]] |= !is_on_side(n, j->out->normals + 3 * (uint64_t)corner[c]);
+    }
+    for (uint64_t c = 0; c < 3 * j->triangles; c++)
+        count += sharp[corner[c]];
+    return count;
+}
+
+/* Separates the sides of creases. */
+static ebpo_status light_creases(joiner *j, ebpo_error *error)
+{
+    ebpo_surface_mesh *out = j->out;
+    uint64_t most = j->vertices + 3 * j->triangles, room = 0;
+    sides s = { .sharp = ebpo_alloc_zero(most, sizeof *s.sharp) };
+    bool made = s.sharp != NULL;
+    if (made) {
+        room = j->vertices + mark_creases(j, s.sharp);
+        uint64_t places = j->vertices, normals = j->vertices, colours = j->vertices;
+        s.sum = ebpo_alloc_zero(room, sizeof *s.sum);
+        s.next = ebpo_alloc(room, sizeof *s.next);
+        made = s.sum && s.next &&
+               ebpo_grow(&out->mesh.xyz64, &places, room, 3 * sizeof *out->mesh.xyz64) &&
+               ebpo_grow(&out->normals, &normals, room, 3 * sizeof *out->normals) &&
+               (!out->colours.vertex || ebpo_grow(&out->colours.vertex, &colours, room, 4));
+    }
+    ebpo_status status = EBPO_OK;
+    if (!made)
+        status = ebpo_fail_memory(error, most + room * 64);
+    else if (room >= NONE)
+        status = ebpo_fail(error, EBPO_E_LIMIT, "the patches have more than 2^32 - 2 vertices");
+    if (status == EBPO_OK) {
+        memset(s.next, 0xff, room * sizeof *s.next);
+        separate_sides(j, &s);
+    }
+    free(s.sum);
+    free(s.next);
+    free(s.sharp);
+    return status;
+}
+
 void ebpo_surface_mesh_free(ebpo_surface_mesh *mesh)
 {
     if (!mesh)
@@ -227,6 +364,8 @@ ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader, const uint64_t *p
         status = join_patch(&j, patches[i], error);
     if (status == EBPO_OK && faces)
         status = join_faces(&j, faces, error);
+    if (status == EBPO_OK)
+        status = light_creases(&j, error);
     out->mesh.vertex_count = j.vertices;
     out->mesh.face_count = j.triangles;
     out->patches = count;

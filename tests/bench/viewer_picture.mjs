@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 
 const TILE_FACES = 1 << 20;   // faces that are drawn together
-const LEAST_COSINE = 0.766;   // of the angle between a face's normal and its vertex's, as the viewer shades faces (levels/surface_faces.c)
+const LEAST_COSINE = 0.766;   // of the angle between a face's normal and its vertex's, as the viewer shades meshes (tools/web/mesh.js)
 const FRAMES = 2, ROUNDS = 3; // frames of each kind, by turns
 
 // Reads a binary PLY file as ebpo-generate writes it: { corners: Float32Array, faces: Uint32Array }.

@@ -265,9 +265,40 @@ static int by_edge(const void *a, const void *b)
     return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
 }
 
-/* Returns true if each directed edge has an opposite one. */
-static bool is_closed(const ebpo_mesh *mesh)
+static const double *sorted_points;
+
+static int by_point(const void *a, const void *b)
 {
+    const double *p = sorted_points + 3 * (uint64_t) * (const uint32_t *)a,
+                 *q = sorted_points + 3 * (uint64_t) * (const uint32_t *)b;
+    for (int k = 0; k < 3; k++)
+        if (p[k] != q[k])
+            return p[k] < q[k] ? -1 : 1;
+    return 0;
+}
+
+/* Gives vertices at equal points the same index. */
+static void weld(ebpo_mesh *mesh)
+{
+    uint32_t *order = malloc(mesh->vertex_count * sizeof *order),
+             *number = malloc(mesh->vertex_count * sizeof *number);
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        order[v] = v;
+    sorted_points = mesh->xyz64;
+    qsort(order, mesh->vertex_count, sizeof *order, by_point);
+    for (uint64_t i = 0; i < mesh->vertex_count; i++)
+        number[order[i]] =
+            i && by_point(&order[i - 1], &order[i]) == 0 ? number[order[i - 1]] : order[i];
+    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
+        mesh->faces[i] = number[mesh->faces[i]];
+    free(order);
+    free(number);
+}
+
+/* Returns true if each directed edge has an opposite one; vertices at equal points are one. */
+static bool is_closed(ebpo_mesh *mesh)
+{
+    weld(mesh);
     uint64_t count = 3 * mesh->face_count;
     uint32_t(*edge)[2] = malloc(count * sizeof *edge), (*back)[2] = malloc(count * sizeof *back);
     for (uint64_t i = 0; i < count; i++) {
@@ -394,6 +425,66 @@ START_TEST(test_shared_vertices_are_equal)
 }
 END_TEST
 
+/* Joins the patches of level 0. */
+static ebpo_surface_mesh join_root(const ebpo_tree *tree)
+{
+    ebpo_surface_mesh joined;
+    ebpo_error error = EBPO_ERROR_INIT;
+    must(ebpo_surface_join(&tree->surface, &tree->info, (uint64_t[]){ 0 }, 1, &joined, &error),
+         "join", &error);
+    return joined;
+}
+
+/* The root's patch of a divided box has less than the sixteenth of its faces, 1,200, and each
+ * vertex has a normal for each side of the box. */
+START_TEST(test_boxes_stay_sharp)
+{
+    ebpo_tree tree;
+    build(&tree, ebpo_test_box((double[3]){ 0.1, 0.2, 0.3 }, (double[3]){ 1.1, 1.2, 1.3 }, 40), 1);
+    ebpo_surface_mesh joined = join_root(&tree);
+    ck_assert_uint_le(joined.mesh.face_count, 800);
+    for (uint64_t c = 0; c < 3 * joined.mesh.face_count; c++) {
+        double t[3][3], u[3], w[3], n[3];
+        const float *normal = joined.normals + 3 * (uint64_t)joined.mesh.faces[c];
+        get_face(&joined.mesh, c / 3, t);
+        ebpo_vec3_subtract(t[1], t[0], u);
+        ebpo_vec3_subtract(t[2], t[0], w);
+        ebpo_vec3_cross(u, w, n);
+        for (int k = 0; k < 3; k++)
+            ck_assert_double_eq_tol((double)normal[k], n[k] / ebpo_vec3_length(n), 0.01);
+    }
+    ebpo_surface_mesh_free(&joined);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
+static double volume_of(const ebpo_mesh *mesh)
+{
+    double sum = 0;
+    for (uint64_t i = 0; i < mesh->face_count; i++) {
+        double t[3][3], n[3];
+        get_face(mesh, i, t);
+        ebpo_vec3_cross(t[0], t[1], n);
+        sum += ebpo_vec3_dot(n, t[2]) / 6;
+    }
+    return sum;
+}
+
+/* Vertices of patches are beside the surface, so patches of a ball are not inscribed: the volume
+ * stays. */
+START_TEST(test_patches_keep_the_volume)
+{
+    ebpo_tree tree;
+    build(&tree, ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 5), 1);
+    ebpo_surface_mesh joined = join_root(&tree);
+    double least = volume_of(&joined.mesh) / volume_of(&tree.mesh);
+
+    ck_assert_double_eq_tol(least, 1, 0.005);
+    ebpo_surface_mesh_free(&joined);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 /* Nearly all triangles of a closed patch need one byte, and readers compute normals that are on no
  * border. Few normals are on the back of their triangles. */
 START_TEST(test_codes_are_short)
@@ -464,7 +555,7 @@ START_TEST(test_too_many_triangles)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_patch_mesh mesh = { .vertex_count = 3, .triangle_count = UINT32_MAX / 3 + 1 };
-    ck_assert_int_eq(ebpo_simplify(&mesh, 100, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_simplify(&mesh, 100, 0, &error), EBPO_E_LIMIT);
 }
 END_TEST
 
@@ -559,36 +650,6 @@ END_TEST
 
 /* --- views --- */
 
-static const double *sorted_points;
-
-static int by_point(const void *a, const void *b)
-{
-    const double *p = sorted_points + 3 * (uint64_t) * (const uint32_t *)a,
-                 *q = sorted_points + 3 * (uint64_t) * (const uint32_t *)b;
-    for (int k = 0; k < 3; k++)
-        if (p[k] != q[k])
-            return p[k] < q[k] ? -1 : 1;
-    return 0;
-}
-
-/* Gives vertices at equal points the same index. */
-static void weld(ebpo_mesh *mesh)
-{
-    uint32_t *order = malloc(mesh->vertex_count * sizeof *order),
-             *number = malloc(mesh->vertex_count * sizeof *number);
-    for (uint32_t v = 0; v < mesh->vertex_count; v++)
-        order[v] = v;
-    sorted_points = mesh->xyz64;
-    qsort(order, mesh->vertex_count, sizeof *order, by_point);
-    for (uint64_t i = 0; i < mesh->vertex_count; i++)
-        number[order[i]] =
-            i && by_point(&order[i - 1], &order[i]) == 0 ? number[order[i - 1]] : order[i];
-    for (uint64_t i = 0; i < 3 * mesh->face_count; i++)
-        mesh->faces[i] = number[mesh->faces[i]];
-    free(order);
-    free(number);
-}
-
 static void make_view(const char *name, uint32_t around, uint32_t across, ebpo_file **file)
 {
     ebpo_tree tree;
@@ -641,7 +702,6 @@ START_TEST(test_views_are_closed)
             ck_assert(mesh.pixels <= pixels || (!faces && mesh.patches > 4));
             ck_assert(faces || mesh.mesh.face_count >= before);
             before = faces ? before : mesh.mesh.face_count;
-            weld(&mesh.mesh);
             ck_assert(is_closed(&mesh.mesh));
             ebpo_surface_mesh_free(&mesh);
         }
@@ -694,7 +754,6 @@ START_TEST(test_views_end_at_faces)
     ck_assert_uint_eq(mesh.faces, ebpo_file_info(file)->face_count);
     ck_assert_uint_eq(mesh.mesh.face_count, mesh.faces);
     ck_assert_double_eq(mesh.error, 0);
-    weld(&mesh.mesh);
     ck_assert(is_closed(&mesh.mesh));
     ebpo_surface_mesh_free(&mesh);
     ebpo_close(file);
@@ -758,7 +817,6 @@ START_TEST(test_boxes_keep_patches)
     must(take_view(part, &options, &kept, &error), "view of the part", &error);
     ck_assert_uint_gt(kept.patches, 1);
     ck_assert_uint_le(kept.patches, whole.patches);
-    weld(&kept.mesh);
     ck_assert(is_closed(&kept.mesh));
     ebpo_surface_mesh_free(&whole);
     ebpo_surface_mesh_free(&kept);
@@ -768,7 +826,6 @@ START_TEST(test_boxes_keep_patches)
     options.pixels = 0;
     must(take_view(part, &options, &kept, &error), "finest view of the part", &error);
     ck_assert_uint_eq(kept.faces, 0);
-    weld(&kept.mesh);
     ck_assert(is_closed(&kept.mesh));
     ebpo_surface_mesh_free(&kept);
     ebpo_close(part);
@@ -848,6 +905,8 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_joined_levels_are_closed);
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_shared_vertices_are_equal);
+    tcase_add_test(tests, test_boxes_stay_sharp);
+    tcase_add_test(tests, test_patches_keep_the_volume);
     tcase_add_test(tests, test_codes_are_short);
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);

@@ -172,7 +172,10 @@ EBPO_API EBPO_MUST_USE ebpo_status ebpo_lod_normals(const ebpo_info *info, const
 typedef struct ebpo_surface_mesh {
     ebpo_mesh mesh; /* double precision */
 
-    /* [vertex_count][3] unit normals */
+    /*
+     * [vertex_count][3] unit normals. A vertex at a crease is repeated, with one normal for each
+     * side.
+     */
     float *normals;
 
     /* Colours of vertices. If the patches have no colours, its arrays are NULL. */
