@@ -310,6 +310,16 @@ EBPO_EIGHT f8 f8_from_shorts(const int16_t *x)
 EBPO_EIGHT f8 f8_min3(f8 a, f8 b, f8 c) { return f8_min(a, f8_min(b, c)); }
 EBPO_EIGHT f8 f8_max3(f8 a, f8 b, f8 c) { return f8_max(a, f8_max(b, c)); }
 
+/* Returns a * b + c, and a * b - c, rounded once or twice. Results differ between processors, so
+ * use these functions only for filters. */
+#if defined(EBPO_SIMD_AVX2) && defined(__FMA__)
+EBPO_EIGHT f8 f8_mul_add(f8 a, f8 b, f8 c) { return _mm256_fmadd_ps(a, b, c); }
+EBPO_EIGHT f8 f8_mul_sub(f8 a, f8 b, f8 c) { return _mm256_fmsub_ps(a, b, c); }
+#else
+EBPO_EIGHT f8 f8_mul_add(f8 a, f8 b, f8 c) { return f8_add(f8_mul(a, b), c); }
+EBPO_EIGHT f8 f8_mul_sub(f8 a, f8 b, f8 c) { return f8_sub(f8_mul(a, b), c); }
+#endif
+
 /* Returns 1 / a with a relative error of about 2^-22; NaN if a is 0. Results differ between
  * processors, so use this function only for filters. */
 EBPO_EIGHT f8 f8_inverse(f8 a)
@@ -439,9 +449,10 @@ EBPO_EIGHT f8 f8_from_doubles(v4d low, v4d high)
 typedef __m256d d3; /* the fourth lane is unused */
 
 EBPO_EIGHT d3 d3_all(double x) { return _mm256_set1_pd(x); }
-/* Loads the doubles one by one. Often they were just stored one by one, and a vector load would
- * then wait until these stores have reached the cache. */
-EBPO_EIGHT d3 d3_load(const double x[3]) { return _mm256_setr_pd(x[0], x[1], x[2], 0); }
+EBPO_EIGHT d3 d3_load(const double x[3])
+{
+    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(x)), _mm_load_sd(x + 2), 1);
+}
 EBPO_EIGHT d3 d3_add(d3 a, d3 b) { return _mm256_add_pd(a, b); }
 EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { return _mm256_sub_pd(a, b); }
 EBPO_EIGHT d3 d3_mul(d3 a, d3 b) { return _mm256_mul_pd(a, b); }
@@ -456,6 +467,12 @@ EBPO_EIGHT d3 d3_signed(d3 a, d3 b)
 }
 /* Returns a bit for each component with its sign bit set. */
 EBPO_EIGHT unsigned d3_signs(d3 a) { return (unsigned)_mm256_movemask_pd(a) & 7; }
+/* Returns the greatest component. */
+EBPO_EIGHT double d3_greatest(d3 a)
+{
+    __m128d x = _mm256_castpd256_pd128(a), z = _mm256_extractf128_pd(a, 1);
+    return _mm_cvtsd_f64(_mm_max_sd(_mm_max_sd(x, _mm_unpackhi_pd(x, x)), z));
+}
 EBPO_EIGHT void d3_store(double x[4], d3 a) { _mm256_storeu_pd(x, a); }
 /* Stores as floats, rounded to nearest, to x[0] .. x[2]; also overwrites x[3]. */
 EBPO_EIGHT void d3_store_floats(float x[4], d3 a) { _mm_storeu_ps(x, _mm256_cvtpd_ps(a)); }
@@ -494,6 +511,11 @@ EBPO_EIGHT unsigned d3_signs(d3 a)
     for (unsigned k = 0; k < 3; k++)
         bits |= (unsigned)(__builtin_signbit(a.x[k]) != 0) << k;
     return bits;
+}
+EBPO_EIGHT double d3_greatest(d3 a)
+{
+    double x = a.x[0] > a.x[1] ? a.x[0] : a.x[1];
+    return x > a.x[2] ? x : a.x[2];
 }
 EBPO_EIGHT void d3_store(double x[4], d3 a) { memcpy(x, a.x, sizeof a.x); }
 EBPO_EIGHT void d3_store_floats(float x[4], d3 a)

@@ -185,21 +185,30 @@ struct ebpo_ray_search {
     /* Tests a face exactly (`facing`: as in a candidate), keeps it if it is a wanted hit, and
      * updates search->limit and search->done. */
     void (*decide)(ebpo_ray_search *search, uint32_t slot, int facing);
-    void *user;
-
-    /* ray_search_begin (rays.c) sets the following fields. */
-    bool done;    /* the search is complete */
-    bool any_hit; /* EBPO_WANTS_ANY: some face is certainly hit, and `decide` was not called */
     void (*judge)(ebpo_ray_search *search); /* tests all waiting candidates */
+    /* Sets the fields of the frame, for any ray. Returns false if the ray misses all faces. */
+    bool (*place)(ebpo_ray_search *search);
+    void *user;
     const ebpo_accel *s;
-    /* The next three fields are in the frame (coordinates in which the subtree's cell has a size of
-     * 1 to 2). direction: its longest coordinate is 2^-12 to 2^12. origin: the ray's origin, moved
-     * along the ray to t = `moved`. error: bound of the error of `origin`. */
-    double direction[3], origin[3], error;
+    bool done;    /* false; later: the search is complete */
+    bool any_hit; /* false; later, EBPO_WANTS_ANY: some face is certainly hit, and `decide` was not
+                   * called */
+    int count;    /* 0; later: the number of waiting candidates */
+
+    /* Fields of the frame (coordinates in which the subtree's cell has a size of 1 to 2), set by
+     * `place` or, for most rays, by ray_place (ray_kernels.c). The fourth doubles are not used.
+     * direction: its longest coordinate is 2^-12 to 2^12. origin: the ray's origin, moved along the
+     * ray to t = `moved`. from: the same in the model's unit. error: bound of the error of
+     * `origin`. */
+    double direction[4], origin[4], from[4], error;
+    float blur; /* distance at which other rounding errors equal the origin's error */
+    double moved, limit_scale; /* limit_scale: converts t of the ray to t in the frame */
+    float bound, surely;       /* `limit`, rounded up; t_max, rounded down */
+
     /* Set by the kernels. Each of the next three arrays has one float for each axis and an unused
-     * fourth float. near_from and far_from: the origin for tests of the nearer and of the farther
-     * sides of boxes, moved by `error` so that no box is missed. inverse: reciprocals of the
-     * direction's coordinates. */
+     * fourth float. inverse: reciprocals of the direction's coordinates. near_from and far_from:
+     * the origin times `inverse`, for tests of the nearer and of the farther sides of boxes; the
+     * origin is moved by `error` so that no box is missed. */
     float near_from[4], far_from[4], inverse[4];
     float step_inverse[4];    /* unused value, then `inverse` */
     double inverse_double[4]; /* inverse of the direction; small coordinates were replaced */
@@ -207,14 +216,8 @@ struct ebpo_ray_search {
      * sides */
     const uint8_t (*side_at)[3];
     int axis[3]; /* the axes x, y, z of tests of faces; z has the direction's longest coordinate */
-    float shear[3]; /* how x, y and t change for a step of 1 along z */
-    /* The origin in the model's unit, in two parts for blocks of floats. */
-    double from[3];
-    float from_high[4], from_low[4];
-    float blur; /* distance at which other rounding errors equal the origin's error */
-    double moved, limit_scale; /* limit_scale: converts t of the ray to t in the frame */
-    float bound, surely;       /* in the frame: `limit`, rounded up; t_max, rounded down */
-    int count;                 /* number of waiting candidates */
+    float shear[3];                  /* how x, y and t change for a step of 1 along z */
+    float from_high[4], from_low[4]; /* `from` in two parts, for blocks of floats */
     ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
 };
 

@@ -38,23 +38,45 @@ static const uint8_t ray_side_at[8][2][3] = {
 #undef LOW
 #undef HIGH
 
-/* Sets the fields of the search that are used in tests of boxes. */
-EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r)
+/* Sets the fields of the frame for most rays, as `place` does, but faster. Returns false if `place`
+ * must scale the direction, move the origin, or handle numbers that are too large. */
+EBPO_EIGHT bool ray_place(ebpo_ray_search *r, d3 from, d3 d, d3 origin)
 {
-    d3 d = d3_load(r->direction), origin = d3_load(r->origin),
-       slack = d3_add(d3_mul(d3_abs(origin), d3_all(0x1p-21)), d3_all(r->error)),
+    const ebpo_accel *s = r->s;
+    double longest = d3_greatest(d3_abs(d)), near = EBPO_RAY_NEAR * s->largest_coordinate;
+    if (!(longest >= EBPO_RAY_SHORTEST && longest <= EBPO_RAY_LONGEST && near < 0x1p30 &&
+          d3_greatest(d3_abs(origin)) <= near && s->scale > 0 && s->scale < INFINITY))
+        return false;
+    d3_store(r->direction, d);
+    d3_store(r->origin, origin);
+    d3_store(r->from, from);
+    r->error = ebpo_ray_error(s, near); /* not that of this origin, for which the walk would wait */
+    r->blur = (float)(r->error * 0x1p23 + 0x1p-30);
+    r->moved = 0;
+    r->limit_scale = s->scale;
+    double beyond = (double)EBPO_RAY_BEYOND, limit = r->limit * s->scale * (1 + 0x1p-20) + 0x1p-90,
+           t_max = r->ray->t_max * s->scale * (1 - 0x1p-20) - 0x1p-90;
+    r->bound = (float)(limit < beyond ? limit : beyond);
+    r->surely = (float)(t_max < beyond ? t_max : beyond);
+    return true;
+}
+
+/* Sets the fields of the search that are used in tests of boxes. */
+EBPO_EIGHT void ray_set_boxes(ebpo_ray_search *r, d3 d, d3 origin)
+{
+    d3 slack = d3_add(d3_mul(d3_abs(origin), d3_all(0x1p-21)), d3_all(r->error)),
        ahead = d3_signed(slack, d),
        inverse = d3_div(d3_all(1), d3_signed(d3_max(d3_abs(d), d3_all(0x1p-72)), d));
     d3_store(r->inverse_double, inverse);
     d3_store_floats(r->inverse, inverse);
     d3_store_floats_after(r->step_inverse, inverse);
-    d3_store_floats(r->near_from, d3_add(origin, ahead));
-    d3_store_floats(r->far_from, d3_sub(origin, ahead));
+    d3_store_floats(r->near_from, d3_mul(d3_add(origin, ahead), inverse));
+    d3_store_floats(r->far_from, d3_mul(d3_sub(origin, ahead), inverse));
     r->side_at = ray_side_at[d3_signs(d)];
 }
 
 /* Sets the fields of the search that are used in tests of faces. */
-EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
+EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r, d3 from)
 {
     static const int axes[4][3] = { { 1, 2, 0 }, { 2, 0, 1 }, { 0, 1, 2 }, { 0, 1, 2 } };
     const double *d = r->direction;
@@ -65,7 +87,6 @@ EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
     for (int i = 0; i < 2; i++)
         r->shear[i] = (float)(d[r->axis[i]] * r->inverse_double[z]);
     r->shear[2] = (float)r->inverse_double[z];
-    d3 from = d3_load(r->from);
     d3_store_floats(r->from_high, from);
     d3_store_floats(r->from_low, d3_beyond_floats(from));
 }
@@ -75,7 +96,7 @@ EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r)
 /* Returns step * side + from for the eight sides at this offset in ebpo_bound. */
 EBPO_EIGHT f8 side_at(const ebpo_bound *b, unsigned offset, f8 step, f8 from)
 {
-    return f8_add(f8_mul(f8_from_bytes((const uint8_t *)b + offset), step), from);
+    return f8_mul_add(f8_from_bytes((const uint8_t *)b + offset), step, from);
 }
 
 /* Returns a bit for each child whose box the ray may intersect between t = 0 and the limit. *enter:
@@ -86,8 +107,8 @@ EBPO_EIGHT unsigned ray_children(const ebpo_ray_search *r, const ebpo_bound *b, 
 {
     f8 origin = f8_load_twice(b->origin), inverse = f8_load_twice(r->inverse),
        step = f8_mul(f8_load_twice(b->origin + 2), f8_load_twice(r->step_inverse)),
-       near = f8_mul(f8_sub(origin, f8_load_twice(r->near_from)), inverse),
-       far = f8_mul(f8_sub(origin, f8_load_twice(r->far_from)), inverse);
+       near = f8_mul_sub(origin, inverse, f8_load_twice(r->near_from)),
+       far = f8_mul_sub(origin, inverse, f8_load_twice(r->far_from));
     f8 x = f8_spread1(step), y = f8_spread2(step), z = f8_spread3(step);
     f8 from = f8_max(f8_max(side_at(b, r->side_at[0][0], x, f8_spread0(near)),
                             side_at(b, r->side_at[0][1], y, f8_spread1(near))),
@@ -136,8 +157,8 @@ EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b
     ray_axis(r, b, r->axis[0], wide, out.x);
     ray_axis(r, b, r->axis[1], wide, out.y);
     for (int i = 0; i < 3; i++) {
-        out.x[i] = f8_sub(out.x[i], f8_mul(out.z[i], f8_all(r->shear[0])));
-        out.y[i] = f8_sub(out.y[i], f8_mul(out.z[i], f8_all(r->shear[1])));
+        out.x[i] = f8_mul_add(out.z[i], f8_all(-r->shear[0]), out.x[i]);
+        out.y[i] = f8_mul_add(out.z[i], f8_all(-r->shear[1]), out.y[i]);
     }
     return out;
 }
@@ -149,10 +170,7 @@ typedef struct edges {
     f8 u, v, w, least, greatest, error;
 } edges;
 
-EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by)
-{
-    return f8_sub(f8_mul(ax, by), f8_mul(ay, bx));
-}
+EBPO_EIGHT f8 signed_area(f8 ax, f8 ay, f8 bx, f8 by) { return f8_mul_sub(ax, by, f8_mul(ay, bx)); }
 
 EBPO_EIGHT edges ray_edges(const projected *a, f8 size_z)
 {
@@ -205,7 +223,7 @@ EBPO_EIGHT void ray_faces(const ebpo_ray_search *r, uint32_t block, ray_lanes *o
         alive &= ~(r->facing > 0 ? out->back : out->front);
     f8 per_step = f8_all(r->shear[2]), size = f8_mul(size_z, f8_all(fabsf(r->shear[2]) * 0x1p-19f));
     f8 whole = f8_add(e.u, f8_add(e.v, e.w)), inverse = f8_div(f8_all(1), whole);
-    f8 sum = f8_add(f8_mul(e.u, a.z[0]), f8_add(f8_mul(e.v, a.z[1]), f8_mul(e.w, a.z[2])));
+    f8 sum = f8_mul_add(e.u, a.z[0], f8_mul_add(e.v, a.z[1], f8_mul(e.w, a.z[2])));
     f8 t = f8_mul(f8_mul(sum, inverse), per_step);
     f8 share = f8_min(f8_abs(f8_mul(f8_mul(e.error, f8_all(6)), inverse)), f8_all(1));
     f8 error = f8_add(f8_mul(f8_mul(f8_sub(max_z, least_z), share), f8_abs(per_step)), size);
@@ -270,12 +288,11 @@ EBPO_EIGHT void ray_block(ebpo_ray_search *r, uint32_t block, bool wide)
  * mispredicted. */
 EBPO_EIGHT void ray_fetch(const ebpo_accel *s, uint32_t child, bool wide)
 {
-    uint32_t number = child & ~EBPO_IS_BLOCK;
-    const char *node = (const char *)(s->bound + number),
-               *faces = (const char *)ebpo_accel_meshlet(s, number),
-               *at = child & EBPO_IS_BLOCK ? faces : node;
+    uint64_t number = child & ~EBPO_IS_BLOCK, is_node = (child >> 31) ^ 1;
+    uintptr_t faces = (uintptr_t)s->meshlets, nodes = (uintptr_t)s->bound,
+              at = faces + (-is_node & (nodes - faces)) + (number * EBPO_MESHLET_UNIT << is_node);
     for (int i = 0; i < (wide ? 4 : 3); i++)
-        __builtin_prefetch(at + 64 * i);
+        __builtin_prefetch((const char *)at + 64 * i);
 }
 
 /* Returns the nearest of two or more children (`lanes`), and pushes the other children onto the
@@ -292,12 +309,20 @@ EBPO_EIGHT uint32_t ray_nearest(const ebpo_accel *s, ebpo_visit *stack, uint32_t
                    y = ebpo_visit_make(key[second], b->child[second]), far = x > y ? x : y;
         stack[(*top)++] = far;
         ray_fetch(s, (uint32_t)far, wide);
-        return (uint32_t)(x > y ? y : x);
+        return (uint32_t)(x ^ y ^ far); /* without a branch that would often be mispredicted */
     }
-    uint32_t before = *top;
-    *top = ebpo_visit_push(stack, before, b, lanes, key) - 1;
-    for (uint32_t i = before; i < *top; i++)
-        ray_fetch(s, (uint32_t)stack[i], wide);
+    for (unsigned left = lanes; left; left &= left - 1) {
+        unsigned lane = (unsigned)__builtin_ctz(left);
+        /* the children that are farther, and earlier children that are as far, are below */
+        f8 own = f8_all(key[lane]);
+        unsigned below = (f8_bits(f8_less(own, enter)) |
+                          (f8_bits(f8_at_most(own, enter)) & ((1u << lane) - 1))) &
+                         lanes;
+        ray_fetch(s, b->child[lane], wide);
+        stack[*top + (uint32_t)__builtin_popcount(below)] =
+            ebpo_visit_make(key[lane], b->child[lane]);
+    }
+    *top += (uint32_t)__builtin_popcount(lanes) - 1;
     return (uint32_t)stack[*top];
 }
 
@@ -326,29 +351,40 @@ EBPO_EIGHT uint32_t ray_enter(const ebpo_accel *s, ebpo_visit *stack, uint32_t *
                   : ray_next(s, stack, top, b, lanes, wide);
 }
 
+/* Pops the next child that is not beyond the limit. Returns false if there is none. */
+EBPO_EIGHT bool ray_pop(const ebpo_ray_search *r, const ebpo_visit *stack, uint32_t *top,
+                        uint32_t *child, bool sorted)
+{
+    ebpo_visit v;
+    do {
+        if (*top == 0)
+            return false;
+        v = stack[--*top];
+    } while (sorted && ebpo_visit_key(v) > r->bound);
+    *child = (uint32_t)v;
+    return true;
+}
+
 /* Walks through a child of the hierarchy (as in ebpo_bound). `stack`: space for the visits.
  * `sorted`: see ray_enter. */
 EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack, bool wide,
                             bool sorted)
 {
     const ebpo_accel *s = r->s;
-    uint32_t top = 1;
-    stack[0] = ebpo_visit_make(0, begin);
-    while (top && !r->done) {
-        ebpo_visit v = stack[--top];
-        uint32_t child = (uint32_t)v;
-        if (sorted && ebpo_visit_key(v) > r->bound)
-            continue;
+    uint32_t top = 0, child = begin;
+    for (;;) {
         while (!(child & EBPO_IS_BLOCK)) {
             f8 enter;
             const ebpo_bound *b = &s->bound[child];
             unsigned lanes = ray_children(r, b, &enter);
-            if (!lanes)
-                break;
-            child = ray_enter(s, stack, &top, b, lanes, enter, wide, sorted);
+            if (lanes)
+                child = ray_enter(s, stack, &top, b, lanes, enter, wide, sorted);
+            else if (!ray_pop(r, stack, &top, &child, sorted))
+                return;
         }
-        if (child & EBPO_IS_BLOCK)
-            ray_block(r, child & ~EBPO_IS_BLOCK, wide);
+        ray_block(r, child & ~EBPO_IS_BLOCK, wide);
+        if (r->done || !ray_pop(r, stack, &top, &child, sorted))
+            return;
     }
 }
 
@@ -369,11 +405,18 @@ static void ray_walk_from(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack)
 static void ray_walk(ebpo_ray_search *r)
 {
     ebpo_visit stack[EBPO_VISITS_MAX];
-    ray_set_boxes(r);
-    ray_set_faces(r);
+    d3 from = d3_load(r->ray->origin), d = d3_load(r->ray->direction),
+       origin = d3_mul(d3_sub(from, d3_load(r->s->centre)), d3_all(r->s->scale));
+    if (!ray_place(r, from, d, origin)) {
+        if (!r->place(r))
+            return;
+        from = d3_load(r->from);
+        d = d3_load(r->direction);
+        origin = d3_load(r->origin);
+    }
+    ray_set_boxes(r, d, origin);
+    ray_set_faces(r, from);
     ray_walk_from(r, r->s->root_bound, stack);
-    if (r->wants == EBPO_WANTS_FIRST)
-        drop_beyond(r);
 }
 
 /* --- packets: several rays walked together --- */
@@ -383,8 +426,8 @@ static ebpo_ray_search *ray_begin(const ebpo_ray_group *g, unsigned i)
 {
     ebpo_ray_search *r = g->begin(g->user, i);
     if (r) {
-        ray_set_boxes(r);
-        ray_set_faces(r);
+        ray_set_boxes(r, d3_load(r->direction), d3_load(r->origin));
+        ray_set_faces(r, d3_load(r->from));
     }
     return r;
 }

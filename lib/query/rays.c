@@ -162,7 +162,7 @@ static double to_frame(ebpo_ray_search *r)
  * the cube from -2 * `largest` to 2 * `largest`. `largest`: upper bound of the faces' coordinates.
  * Returns false if the ray misses the cube. The rounding error of *t is far smaller than the margin
  * between faces and cube. (An origin that is too far away for this computation is not moved: see
- * ray_search_begin.) */
+ * place_ray.) */
 static bool enters_cube(const ebpo_ray_search *r, double largest, double *t)
 {
     double from = 0, to = INFINITY;
@@ -235,16 +235,10 @@ static void judge_waiting(ebpo_ray_search *r)
     r->count = 0;
 }
 
-/* Prepares the search of an accel. Returns false if the ray misses all faces. The caller calls a
- * kernel and then judge_waiting, which call r->decide for every face that may be a wanted hit. */
-static bool ray_search_begin(ebpo_ray_search *r, const ebpo_accel *s)
+/* Sets the fields of the frame (ebpo_ray_search.place). */
+static bool place_ray(ebpo_ray_search *r)
 {
-    r->s = s;
-    r->judge = judge_waiting;
-    r->count = 0;
-    r->done = r->any_hit = false;
-    if (s->bound_count == 0)
-        return false;
+    const ebpo_accel *s = r->s;
     double greatest = to_frame(r);
     if (!(greatest <= EBPO_RAY_NEAR * s->largest_coordinate) &&
         greatest < 0x1p46 * s->largest_coordinate && !move_origin(r, &greatest))
@@ -295,7 +289,8 @@ static void keep_first(casting *c, const ebpo_ray_found *m)
 {
     if (c->count && compare_found(m, &c->first, &c->ray) >= 0)
         return;
-    c->first = *m;
+    if (c->count)
+        c->first = *m;
     c->count = 1;
     double limit = m->intersection.t * (1 + 0x1p-48) + DBL_MIN;
     c->limit = limit < c->limit ? limit : c->limit;
@@ -419,17 +414,18 @@ static bool intersects_box(const double origin[3], const double direction[3], do
     return from <= to;
 }
 
-/* Tests a candidate exactly (ebpo_ray_search.decide). */
+/* Tests a candidate exactly (ebpo_ray_search.decide). The first hit is made where it will be kept.
+ */
 static void decide_face(ebpo_ray_search *r, uint32_t slot, int facing)
 {
     casting *c = r->user;
-    ebpo_ray_found m;
+    ebpo_ray_found other, *m = c->count ? &other : &c->first;
     uint32_t local = ebpo_accel_slot_face(r->s, slot);
-    ebpo_accel_triangle(r->s, slot, m.triangle);
-    if (!casting_intersects(c, facing, &m))
+    ebpo_accel_triangle(r->s, slot, m->triangle);
+    if (!casting_intersects(c, facing, m))
         return;
-    m.file_face = ebpo_accel_file_face(r->s, local);
-    casting_keep(c, &m);
+    m->file_face = ebpo_accel_file_face(r->s, local);
+    casting_keep(c, m);
     r->done = c->done;
     r->limit = c->limit;
 }
@@ -440,17 +436,21 @@ static int facing_of(ebpo_ray_sides sides)
     return sides == EBPO_RAY_BOTH ? 0 : sides == EBPO_RAY_FRONT ? 1 : -1;
 }
 
-/* Prepares the search of the faces of a subtree or of the whole model. Returns false if the ray
- * misses all faces. */
-static bool begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
+/* Prepares the search of the faces of a subtree or of the whole model. The caller calls a kernel
+ * and then end_search, which call decide_face for every face that may be a wanted hit. */
+static inline void begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel *s)
 {
     r->ray = &c->ray;
     r->wants = c->wants;
     r->facing = facing_of(c->sides);
     r->limit = c->limit;
     r->decide = decide_face;
+    r->judge = judge_waiting;
+    r->place = place_ray;
     r->user = c;
-    return ray_search_begin(r, s);
+    r->s = s;
+    r->done = r->any_hit = false;
+    r->count = 0;
 }
 
 /* Ends a search after the kernel's walk. */
@@ -468,8 +468,9 @@ static void end_search(ebpo_ray_search *r)
 static void cast_subtree(casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
-    if (!begin_search(c, &r, s))
+    if (s->bound_count == 0)
         return;
+    begin_search(c, &r, s);
     c->context->model->kernels.ray->walk(&r);
     end_search(&r);
 }
@@ -753,7 +754,8 @@ static ebpo_ray_search *begin_of_group(void *user, unsigned i)
     begin_ray(g->b, g->index[i], g->worker, &g->c[i]);
     g->c[i].found = &g->found[i];
     g->c[i].capacity = &g->capacity[i];
-    return begin_search(&g->c[i], &g->search[i], g->rays.s) ? &g->search[i] : NULL;
+    begin_search(&g->c[i], &g->search[i], g->rays.s);
+    return g->rays.s->bound_count && place_ray(&g->search[i]) ? &g->search[i] : NULL;
 }
 
 static void add_to_group(group *g, uint64_t ray)

@@ -63,11 +63,23 @@ EBPO_EIGHT f8 multiply(f8 a, f8 b)
     products++;
     return f8_mul(a, b);
 }
+EBPO_EIGHT f8 multiply_add(f8 a, f8 b, f8 c)
+{
+    products++;
+    return f8_mul_add(a, b, c);
+}
+EBPO_EIGHT f8 multiply_sub(f8 a, f8 b, f8 c)
+{
+    products++;
+    return f8_mul_sub(a, b, c);
+}
 #define __builtin_prefetch    note_prefetch
 #define ebpo_face_block_open  open_block
 #define ebpo_accel_fetch_face fetch_face
 #define f8_from_bytes         decode_sides
 #define f8_mul                multiply
+#define f8_mul_add            multiply_add
+#define f8_mul_sub            multiply_sub
 #define EBPO_KERNEL_SUFFIX    counted
 #include "query/ray_kernels.c"
 #undef __builtin_prefetch
@@ -364,6 +376,45 @@ static uint64_t count_sides(query_model *m, uint64_t part, uint64_t *hit)
     return count_sides_aside(m, 0, part, hit);
 }
 
+/* The kernel itself places ordinary rays in the frame; only far, long and short rays need `place`.
+ */
+static uint64_t placed;
+static bool (*uncounted_place)(ebpo_ray_search *search);
+static bool counted_place(ebpo_ray_search *r)
+{
+    placed++;
+    return uncounted_place(r);
+}
+static void walk_with_counted_place(ebpo_ray_search *r)
+{
+    uncounted_place = r->place;
+    r->place = counted_place;
+    ebpo_ray_kernels_best()->walk(r);
+}
+
+START_TEST(test_kernel_places_ordinary_rays)
+{
+    const ebpo_ray_kernels kernels = { .walk = walk_with_counted_place };
+    const double near[3] = { 0.1, 0.2, -2 }, far[3] = { 0.1, 0.2, -1e6 };
+    double direction[3] = { 0.01, 0.02, 1 };
+    query_model m;
+    ebpo_ray_hit hit;
+    bool any;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &kernels;
+    placed = 0;
+    ASSERT_OK(ebpo_ray_first(m.context, near, direction, INFINITY, &hit, &any, error));
+    ck_assert_uint_eq(placed, 0);
+    ASSERT_OK(ebpo_ray_first(m.context, far, direction, INFINITY, &hit, &any, error));
+    ck_assert_uint_eq(placed, 1);
+    for (int k = 0; k < 3; k++)
+        direction[k] *= 0x1p-40;
+    ASSERT_OK(ebpo_ray_first(m.context, near, direction, INFINITY, &hit, &any, error));
+    ck_assert_uint_eq(placed, 2);
+    query_model_free(&m);
+}
+END_TEST
+
 /* A picture of nothing needs one visit of a node for each EBPO_RAY_GROUP rays. */
 START_TEST(test_bundles_miss_together)
 {
@@ -642,6 +693,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
     tcase_add_test(many, test_far_rays_match_single_rays);
+    tcase_add_test(many, test_kernel_places_ordinary_rays);
     tcase_add_test(many, test_bundles_miss_together);
     tcase_add_test(many, test_coherent_rays_share_nodes);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
