@@ -154,7 +154,7 @@ def print_shares(rows):
 def measure(ebpo, mesh, folder, pixels):
     """Print the levels of a mesh. Return its row of the last table, or None if it has no patches."""
     plain, file, part = folder / "plain.h5", folder / "model.h5", folder / "part.h5"
-    _, without = run(ebpo, "convert", "-q", "--parts=-border", mesh, plain)
+    _, without = run(ebpo, "convert", "-q", mesh, plain)
     _, build = run(ebpo, "convert", "-q", "--parts=+surface", mesh, file)
     info = json.loads(run(ebpo, "info", "--json", file)[0])
     if "surface" not in info["bytes"]:
