@@ -559,6 +559,46 @@ START_TEST(test_too_many_triangles)
 }
 END_TEST
 
+/* Strips of triangles whose corners are on a line, except for rounding errors: their planes have no
+ * certain digits, but vertices stay near the line. */
+START_TEST(test_thin_triangles_stay_in_place)
+{
+    enum { COUNT = 40 };
+    uint64_t state = 1, fewer = 0;
+    for (int run = 0; run < 500; run++) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_patch_mesh mesh = { .vertex = calloc(COUNT, sizeof *mesh.vertex),
+                                 .triangle = malloc(COUNT * 3 * sizeof *mesh.triangle),
+                                 .vertex_count = COUNT,
+                                 .vertex_capacity = COUNT,
+                                 .triangle_count = COUNT - 2,
+                                 .triangle_capacity = COUNT };
+        double from[3], step[3];
+        for (int k = 0; k < 3; k++) {
+            from[k] = ebpo_test_random_unit(&state);
+            step[k] = (ebpo_test_random_unit(&state) - 0.5) / COUNT;
+        }
+        for (uint32_t v = 0; v < COUNT; v++) {
+            for (int k = 0; k < 3; k++)
+                mesh.vertex[v].at[k] = from[k] + v * step[k];
+            mesh.vertex[v].key = UINT64_MAX;
+            mesh.vertex[v].weight = 1;
+            uint32_t t[3] = { v + v % 2, v + 1 - v % 2, v + 2 };
+            if (v < COUNT - 2)
+                memcpy(mesh.triangle + 3 * (uint64_t)v, t, sizeof t);
+        }
+        must(ebpo_simplify(&mesh, 8, 1e-3, &error), "simplify", &error);
+        fewer += mesh.triangle_count < COUNT - 2;
+        for (uint64_t v = 0; v < mesh.vertex_count; v++)
+            for (int k = 0; k < 3; k++)
+                ck_assert_double_le(fabs(mesh.vertex[v].at[k] - from[k] - COUNT / 2 * step[k]),
+                                    0.51 * COUNT * fabs(step[k]) + 1e-6);
+        ebpo_patch_mesh_free(&mesh);
+    }
+    ck_assert_uint_gt(fewer, 250);
+}
+END_TEST
+
 /* The work of encoding does not grow with the square of the number of triangles that share an edge:
  * 2^39 steps would exceed the time limit of the test. */
 START_TEST(test_triangles_that_share_an_edge)
@@ -911,6 +951,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);
     tcase_add_test(tests, test_too_many_triangles);
+    tcase_add_test(tests, test_thin_triangles_stay_in_place);
     tcase_add_test(tests, test_triangles_that_share_an_edge);
     tcase_add_test(tests, test_decoding_reads_one_row);
     tcase_add_test(tests, test_hostile_codes);
