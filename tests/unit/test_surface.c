@@ -458,6 +458,39 @@ START_TEST(test_boxes_stay_sharp)
 }
 END_TEST
 
+/* Joining one patch moves none of its vertices, also near holes, where several vertices are in one
+ * border cell. So the patch's error remains right, and it has the border of its neighbours. */
+START_TEST(test_one_patch_keeps_its_points)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = waves(182, 92);
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < mesh.face_count; i++)
+        if (i % 50 > 7)
+            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * i, 3 * sizeof *mesh.faces);
+    mesh.face_count = kept;
+    build(&tree, mesh, 1);
+    ck_assert_uint_gt(tree.surface.patch_count, 2);
+    for (uint64_t i = 0; i < tree.surface.patch_count; i++) {
+        ebpo_patch patch;
+        ebpo_surface_mesh joined;
+        must(ebpo_surface_decode(&tree.surface, &tree.info, i, &patch, &error), "decode", &error);
+        must(ebpo_surface_join(&tree.surface, &tree.info, &i, 1, &joined, &error), "join", &error);
+        ck_assert_uint_eq(joined.mesh.face_count, patch.triangle_count);
+        for (uint64_t k = 0; k < patch.triangle_count; k++) {
+            double a[3][3], b[3][3];
+            get_triangle(&patch, k, a);
+            get_face(&joined.mesh, k, b);
+            ck_assert_mem_eq(a, b, sizeof a);
+        }
+        ebpo_patch_free(&patch);
+        ebpo_surface_mesh_free(&joined);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 static double volume_of(const ebpo_mesh *mesh)
 {
     double sum = 0;
@@ -946,6 +979,7 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_shared_vertices_are_equal);
     tcase_add_test(tests, test_boxes_stay_sharp);
+    tcase_add_test(tests, test_one_patch_keeps_its_points);
     tcase_add_test(tests, test_patches_keep_the_volume);
     tcase_add_test(tests, test_codes_are_short);
     tcase_add_test(tests, test_few_faces_have_none);
