@@ -25,10 +25,12 @@
 enum { MOST_CORNERS = 512 };
 /* OPEN_WEIGHT: weight of the planes at open edges (edges with one triangle). LENGTH_WEIGHT: weight
  * of the squared length of an edge in the cost. PLACE_WEIGHT: weight of the squared distance of a
- * new vertex from the middle of its edge. LEAST_COSINE: least cosine between the normals of a
- * triangle before and after a collapse. */
+ * new vertex from the middle of its edge. LEAST_WEIGHT: the same, as a part of the sum of all
+ * weights; it is greater only for long thin triangles, whose equations would have no certain
+ * digits. LEAST_COSINE: least cosine between the normals of a triangle before and after a collapse.
+ */
 static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, PLACE_WEIGHT = 1e-3,
-                    LEAST_COSINE = 0.25;
+                    LEAST_WEIGHT = 1e-9, LEAST_COSINE = 0.25;
 
 /* Weighted sums over planes n . x + d = 0. nn: products of two coordinates of n; nd: n times d; dd:
  * d squared. Together they are a symmetric 4 x 4 matrix. area: sum of the areas of the vertex's
@@ -98,7 +100,8 @@ static void add_quadric(quadric *to, const quadric *q)
  * matrix. */
 static void find_least(const quadric *q, const double middle[3], double out[3])
 {
-    const double *a = q->nn, weight = PLACE_WEIGHT * q->area;
+    const double *a = q->nn,
+                 weight = fmax(PLACE_WEIGHT * q->area, LEAST_WEIGHT * (a[0] + a[3] + a[5]));
     double r[3] = { a[0] * middle[0] + a[1] * middle[1] + a[2] * middle[2] + q->nd[0],
                     a[1] * middle[0] + a[3] * middle[1] + a[4] * middle[2] + q->nd[1],
                     a[2] * middle[0] + a[4] * middle[1] + a[5] * middle[2] + q->nd[2] };
@@ -285,8 +288,8 @@ static void remove_dead_corners(simplifier *s, uint32_t v)
     s->corners[v] = count;
 }
 
-/* Calls offer_collapse in both directions for each edge of vertex v. If `upwards` is true, omits
- * edges whose other vertex has a lower index than v. */
+/* Calls offer_collapse for each edge of vertex v. If `upwards` is true, omits edges whose other
+ * vertex has a lower index than v. */
 static void offer_edges(simplifier *s, uint32_t v, bool upwards)
 {
     uint32_t c = s->head[v];

@@ -605,11 +605,13 @@ static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
     return *v->etag || *v->modified || t->options->unversioned;
 }
 
-/* Returns true if a request may share an attempt with others. After a failure, it may not. */
+/* Returns true if a request may share an attempt with others. After a failure, it may not. Neither
+ * may it late in its time limit, because the attempt ends with the first limit of its requests. */
 static bool can_share(const ebpo_transfers *t, const ebpo_request *r, double now)
 {
+    bool late = r->deadline > 0 && r->deadline - now < t->options->time_limit / 2;
     return t->joining != JOINING_FAILS && t->is_pinned && may_join(t, r) && !r->failures &&
-           !r->got && r->due <= now;
+           !r->got && r->due <= now && !late;
 }
 
 /* The caller holds the lock. Moves requests from the queue to the attempt of the request r. Their

@@ -43,6 +43,7 @@ typedef struct joiner {
     uint64_t *key;                /* [slots] the border cell (make_key) */
     uint64_t slots;
     bool level_used[EBPO_PATCH_LEVEL + 1]; /* true: a patch of this level was joined */
+    bool alone; /* one patch without faces: its vertices stay, so that its error stays right */
 } joiner;
 
 /* Returns the key of a border cell: the level of the patch's node, and 20 bits (EBPO_PATCH_LEVEL +
@@ -139,7 +140,8 @@ static void add_triangles(joiner *j, const ebpo_patch *patch, const uint32_t *me
 static void add_patch(joiner *j, const ebpo_patch *patch, const bool *border, uint32_t *mesh_vertex)
 {
     for (uint64_t v = 0; v < patch->vertex_count; v++)
-        mesh_vertex[v] = border[v] ? join_vertex(j, patch, v) : add_vertex(j, patch, v);
+        mesh_vertex[v] =
+            border[v] && !j->alone ? join_vertex(j, patch, v) : add_vertex(j, patch, v);
     j->level_used[patch->level] = true;
     add_triangles(j, patch, mesh_vertex);
 }
@@ -356,7 +358,10 @@ ebpo_status ebpo_patches_join(const ebpo_patch_reader *reader, const uint64_t *p
                               ebpo_error *error)
 {
     EBPO_DEFAULT_FP;
-    joiner j = { .reader = reader, .box = ebpo_root_box(reader->info), .out = out };
+    joiner j = { .reader = reader,
+                 .box = ebpo_root_box(reader->info),
+                 .out = out,
+                 .alone = count == 1 && !faces };
     memset(out, 0, sizeof *out);
     out->pixels = NAN;
     ebpo_status status = begin_mesh(&j, patches, count, faces, error);

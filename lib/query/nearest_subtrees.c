@@ -206,10 +206,14 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
     top = top ? top : m->top;
     deep_node at = { .entry = top->nodes.root, .lower = lower };
     for (;;) {
+        bool ends = at.cell.level == node->cell.level;
+        ebpo_entry_kind kind = ebpo_entry_kind_of(at.entry);
+        if (kind == EBPO_ENTRY_UNIFORM || (kind != EBPO_ENTRY_GRAY && !ends))
+            return at.lower; /* not a node above the cut: the file changed after it was opened */
         at.lower = rank_facing(ranking, top, at.entry, at.cell, at.lower, limit, &at.facing);
         if (at.lower > limit)
             return at.lower;
-        if (at.cell.level == node->cell.level)
+        if (ends)
             break;
         unsigned octant = ebpo_cell_octant(node->cell, at.cell.level);
         at.entry = ebpo_table_child(&top->nodes, at.entry, octant);

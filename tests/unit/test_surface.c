@@ -458,6 +458,39 @@ START_TEST(test_boxes_stay_sharp)
 }
 END_TEST
 
+/* Joining one patch moves none of its vertices, also near holes, where several vertices are in one
+ * border cell. So the patch's error remains right, and it has the border of its neighbours. */
+START_TEST(test_one_patch_keeps_its_points)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_mesh mesh = waves(182, 92);
+    uint64_t kept = 0;
+    for (uint64_t i = 0; i < mesh.face_count; i++)
+        if (i % 50 > 7)
+            memmove(mesh.faces + 3 * kept++, mesh.faces + 3 * i, 3 * sizeof *mesh.faces);
+    mesh.face_count = kept;
+    build(&tree, mesh, 1);
+    ck_assert_uint_gt(tree.surface.patch_count, 2);
+    for (uint64_t i = 0; i < tree.surface.patch_count; i++) {
+        ebpo_patch patch;
+        ebpo_surface_mesh joined;
+        must(ebpo_surface_decode(&tree.surface, &tree.info, i, &patch, &error), "decode", &error);
+        must(ebpo_surface_join(&tree.surface, &tree.info, &i, 1, &joined, &error), "join", &error);
+        ck_assert_uint_eq(joined.mesh.face_count, patch.triangle_count);
+        for (uint64_t k = 0; k < patch.triangle_count; k++) {
+            double a[3][3], b[3][3];
+            get_triangle(&patch, k, a);
+            get_face(&joined.mesh, k, b);
+            ck_assert_mem_eq(a, b, sizeof a);
+        }
+        ebpo_patch_free(&patch);
+        ebpo_surface_mesh_free(&joined);
+    }
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 static double volume_of(const ebpo_mesh *mesh)
 {
     double sum = 0;
@@ -556,6 +589,46 @@ START_TEST(test_too_many_triangles)
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_patch_mesh mesh = { .vertex_count = 3, .triangle_count = UINT32_MAX / 3 + 1 };
     ck_assert_int_eq(ebpo_simplify(&mesh, 100, 0, &error), EBPO_E_LIMIT);
+}
+END_TEST
+
+/* Strips of triangles whose corners are on a line, except for rounding errors: their planes have no
+ * certain digits, but vertices stay near the line. */
+START_TEST(test_thin_triangles_stay_in_place)
+{
+    enum { COUNT = 40 };
+    uint64_t state = 1, fewer = 0;
+    for (int run = 0; run < 500; run++) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_patch_mesh mesh = { .vertex = calloc(COUNT, sizeof *mesh.vertex),
+                                 .triangle = malloc(COUNT * 3 * sizeof *mesh.triangle),
+                                 .vertex_count = COUNT,
+                                 .vertex_capacity = COUNT,
+                                 .triangle_count = COUNT - 2,
+                                 .triangle_capacity = COUNT };
+        double from[3], step[3];
+        for (int k = 0; k < 3; k++) {
+            from[k] = ebpo_test_random_unit(&state);
+            step[k] = (ebpo_test_random_unit(&state) - 0.5) / COUNT;
+        }
+        for (uint32_t v = 0; v < COUNT; v++) {
+            for (int k = 0; k < 3; k++)
+                mesh.vertex[v].at[k] = from[k] + v * step[k];
+            mesh.vertex[v].key = UINT64_MAX;
+            mesh.vertex[v].weight = 1;
+            uint32_t t[3] = { v + v % 2, v + 1 - v % 2, v + 2 };
+            if (v < COUNT - 2)
+                memcpy(mesh.triangle + 3 * (uint64_t)v, t, sizeof t);
+        }
+        must(ebpo_simplify(&mesh, 8, 1e-3, &error), "simplify", &error);
+        fewer += mesh.triangle_count < COUNT - 2;
+        for (uint64_t v = 0; v < mesh.vertex_count; v++)
+            for (int k = 0; k < 3; k++)
+                ck_assert_double_le(fabs(mesh.vertex[v].at[k] - from[k] - COUNT / 2 * step[k]),
+                                    0.51 * COUNT * fabs(step[k]) + 1e-6);
+        ebpo_patch_mesh_free(&mesh);
+    }
+    ck_assert_uint_gt(fewer, 250);
 }
 END_TEST
 
@@ -906,11 +979,13 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_files_and_threads);
     tcase_add_test(tests, test_shared_vertices_are_equal);
     tcase_add_test(tests, test_boxes_stay_sharp);
+    tcase_add_test(tests, test_one_patch_keeps_its_points);
     tcase_add_test(tests, test_patches_keep_the_volume);
     tcase_add_test(tests, test_codes_are_short);
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);
     tcase_add_test(tests, test_too_many_triangles);
+    tcase_add_test(tests, test_thin_triangles_stay_in_place);
     tcase_add_test(tests, test_triangles_that_share_an_edge);
     tcase_add_test(tests, test_decoding_reads_one_row);
     tcase_add_test(tests, test_hostile_codes);
