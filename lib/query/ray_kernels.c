@@ -444,7 +444,9 @@ static ebpo_ray_search *ray_begin(const ebpo_ray_group *g, unsigned i)
  * origin was chosen is as large as this; any other ray's origin is at a distance of at least its
  * own shift from the chosen origin, and if the two origins differ in size, at a greater distance.
  *
- * The arrays are those of ebpo_ray_search. */
+ * The arrays are those of ebpo_ray_search, except that origins are not multiplied by the inverses:
+ * near_from and far_from are subtracted from sides before the product. The errors are within the
+ * bounds of the proof, too. */
 typedef struct ray_bundle {
     const uint8_t (*side_at)[3];
     float near_from[3], far_from[3], near_inverse[3], far_inverse[3];
@@ -587,9 +589,9 @@ typedef struct packet_frame {
     double error;   /* the greatest of all rays */
 } packet_frame;
 
-/* Each child that the bundle may intersect is tested for each ray that enters its parent. If one
- * ray is left, this ray walks on alone. Arrays of floats have a ray in each lane; all numbers are
- * in the frame, except `high` and `low`. */
+/* Each child that the bundle may intersect is tested for the rays that enter its parent. If these
+ * are only a few rays, the bundle is not used: all children are tested for each ray. Arrays of
+ * floats have a ray in each lane; all numbers are in the frame, except `high` and `low`. */
 typedef struct ray_packet {
     ebpo_ray_group *g;
     unsigned first, count; /* the group's rays first .. first + count - 1 */
@@ -1134,9 +1136,9 @@ EBPO_EIGHT void ray_walk_in_turns(ebpo_ray_search *const *ray, unsigned count, e
 
 /* --- a group of rays --- */
 
-/* Transforms eight rays from `begin` to the frame as ray_search_begin (rays.c) does, and sets their
+/* Transforms eight rays from `begin` to the frame as place_ray (rays.c) does, and sets their
  * bounds. No search is begun: many rays of a picture miss all blocks. Lanes after the last ray
- * repeat the first of the eight. Returns false if ray_search_begin would move an origin or scale a
+ * repeat the first of the eight. Returns false if place_ray would move an origin or scale a
  * direction. */
 EBPO_EIGHT bool packet_read(ray_packet *p, packet_frame *f, unsigned begin, unsigned count)
 {

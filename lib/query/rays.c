@@ -826,7 +826,8 @@ static ebpo_status end_four(group *g, four *f, ebpo_error *error)
         if (done >> i & 1) {
             uint32_t face = ebpo_accel_slot_face(s, f->candidate[i].slot);
             status = ebpo_model_source_face(m, face, &hit.face, error);
-            store_first(g->b, g->index[f->ray[i]], hit);
+            if (status == EBPO_OK)
+                store_first(g->b, g->index[f->ray[i]], hit);
         } else {
             status = end_ray(g, f->ray[i], error);
         }

@@ -236,6 +236,44 @@ START_TEST(test_ray_batch_names_invalid_ray)
 }
 END_TEST
 
+/* Several threads check the rays. The message names the first invalid ray, and only rays with a
+ * result are flagged as completed. */
+START_TEST(test_ray_batch_of_threads_names_first_invalid_ray)
+{
+    enum { RAYS = 8192, FIRST = 3001, SECOND = 3600 };
+    query_model m;
+    ebpo_ray *rays = query_alloc(RAYS, sizeof *rays);
+    ebpo_ray_hit *first = query_alloc(RAYS, sizeof *first), single;
+    bool *done = query_alloc(RAYS, sizeof *done), found;
+    ebpo_ray_options options = EBPO_RAY_OPTIONS_INIT;
+    ebpo_error failure = EBPO_ERROR_INIT;
+    query_model_make(&m, "cube", query_solid_by_name("cube"), &query_variants[0]);
+    uint64_t state = 5;
+    for (int i = 0; i < RAYS; i++)
+        query_make_ray(&m, &state, rays[i].origin, rays[i].direction, &rays[i].t_max);
+    rays[FIRST].t_max = -1;
+    rays[SECOND].origin[2] = INFINITY;
+    memset(done, 0, RAYS * sizeof *done);
+    options.threads = 4;
+    options.done = done;
+    ck_assert_int_eq(ebpo_ray_first_many(m.context, rays, RAYS, &options, first, &failure),
+                     EBPO_E_ARGUMENT);
+    ck_assert_msg(strstr(failure.message, "ray 3001 ") != NULL, "%s", failure.message);
+    ck_assert(!done[FIRST] && !done[SECOND]);
+    for (int i = 0; i < RAYS; i++)
+        if (done[i]) {
+            ASSERT_OK(ebpo_ray_first(m.context, rays[i].origin, rays[i].direction, rays[i].t_max,
+                                     &single, &found, error));
+            ck_assert_uint_eq(first[i].face, found ? single.face : EBPO_NO_FACE);
+            ck_assert(!found || first[i].t == single.t);
+        }
+    query_model_free(&m);
+    free(rays);
+    free(first);
+    free(done);
+}
+END_TEST
+
 /* --- coherent rays, which a batch walks through the model together --- */
 
 /* Makes rays that differ from the first one by about `share` of its origin and direction, or of one
@@ -692,6 +730,7 @@ TEST_SUITE(query_ray_many)
     tcase_set_timeout(tight, 600);
     tcase_add_loop_test(many, test_ray_batch_matches_single_rays, 0, 3);
     tcase_add_loop_test(many, test_ray_batch_names_invalid_ray, 0, 4);
+    tcase_add_test(many, test_ray_batch_of_threads_names_first_invalid_ray);
     tcase_add_test(many, test_far_rays_match_single_rays);
     tcase_add_test(many, test_kernel_places_ordinary_rays);
     tcase_add_test(many, test_bundles_miss_together);

@@ -791,8 +791,8 @@ typedef struct ebpo_ray {
  * directions, such as rays through the pixels of a row, take about 0.5 times as long as single
  * calls, and other rays of large models about 0.6 times.
  *
- * EBPO_E_ARGUMENT: a ray is not valid; the message has its index. Rays before it may have been
- * computed. Other errors are those of ebpo_ray_first, for the first failed ray in processing
+ * EBPO_E_ARGUMENT: a ray is not valid; the message has the first such index. Other rays may have
+ * been computed. Other errors are those of ebpo_ray_first, for the first failed ray in processing
  * order. On failure `out` is unspecified.
  *
  * Threads: one at a time per context.
