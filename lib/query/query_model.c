@@ -164,21 +164,28 @@ static void kept_envelopes_free(ebpo_kept_envelopes *k)
 /* --- subtrees for the cache --- */
 
 /* Estimates the bytes of a subtree for the cache: the most bytes while it is loaded (*peak), and
- * the bytes that it keeps (*keep). Before that, sends prefetch hints for all data of the subtree of
- * a remote file, and for the source indices of its faces, which may be in results. */
+ * the bytes that it keeps (*keep). Sends prefetch hints for all data of the subtree of a remote
+ * file, and for the source indices of its faces, which may be in results. A subtree of the file is
+ * measured first, because its measure is in the table of subtrees, and a failed connection then
+ * fails once. */
 static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                                     ebpo_error *error)
 {
     ebpo_model *m = user;
     ebpo_slice_size size;
-    uint32_t below = (uint32_t)(key >> 1);
-    ebpo_top_hint(m->top, m->chunks, &below, 1, ebpo_subtree_needs(key & 1) | EBPO_NEEDS_MAPS);
+    uint32_t below = (uint32_t)(key >> 1), needs = ebpo_subtree_needs(key & 1);
+    const ebpo_node *root = &m->top->below[below];
+    bool is_of_file = root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level;
+    if (!is_of_file)
+        ebpo_top_hint(m->top, m->chunks, &below, 1, needs | EBPO_NEEDS_MAPS);
     ebpo_status status =
-        ebpo_slice_measure_nodes(m->chunks, &m->top->below[below], ebpo_subtree_needs(key & 1),
-                                 EBPO_SLICE_ALL, &size, error);
-    if (status == EBPO_OK)
-        ebpo_accel_estimate_subtree(&size, m->info, keep, peak);
-    return status;
+        ebpo_slice_measure_nodes(m->chunks, root, needs, EBPO_SLICE_ALL, &size, error);
+    if (status != EBPO_OK)
+        return status;
+    if (is_of_file)
+        ebpo_top_hint(m->top, m->chunks, &below, 1, needs | EBPO_NEEDS_MAPS);
+    ebpo_accel_estimate_subtree(&size, m->info, keep, peak);
+    return EBPO_OK;
 }
 
 void ebpo_model_count_leaves(ebpo_model *m, const ebpo_accel *s, int sign)
