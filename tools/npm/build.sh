@@ -159,7 +159,7 @@ EOF
 # one caller is inlined only if it is small, because engines compile all of a long function before they run it.
 link_module() { # file, suffix, C files...
     output=$folder/package/$1
-    libraries="${2:+-Os} -lebpo$2 -lzstd$2"
+    libraries="${2:+-Os} -lebpo$2 -lebpo-small -lzstd$2"
     shift 2
     # shellcheck disable=SC2086
     (cd "$here/module" && emcc $flags -std=gnu11 -ffp-contract=off -Wall -Wextra \
@@ -200,8 +200,8 @@ mkdir -p "$deps/include"
     build_gmp
     touch "$deps/.complete"
 }
-folders='core|geometry|io|hdf5_read|hdf5_write|mesh|format'
+folders='core|geometry|hdf5_read|format'
 build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
-# For the viewers' module, whose size delays the first picture.
-build_library -small "$folders|levels_surface|derive_mesh" -Os
+# For the viewers' module, whose size delays the first picture, and for folders in which size matters more than time.
+build_library -small "$folders|io|hdf5_write|mesh|levels_surface|derive_mesh" -Os
 build_package
