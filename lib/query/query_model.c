@@ -166,8 +166,8 @@ static void kept_envelopes_free(ebpo_kept_envelopes *k)
 /* Estimates the bytes of a subtree for the cache: the most bytes while it is loaded (*peak), and
  * the bytes that it keeps (*keep). Sends prefetch hints for all data of the subtree of a remote
  * file, and for the source indices of its faces, which may be in results. A subtree of the file is
- * measured first, because its measure is in the table of subtrees, and a failed connection then
- * fails once. */
+ * measured first: its counts are in the table of subtrees, and if the connection fails, no hint
+ * tries to read the table again. */
 static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, uint64_t *keep,
                                     ebpo_error *error)
 {

@@ -119,7 +119,7 @@ def check(tool, folder, path, ply, points_file, rays, site):
     expect("statistics of local files have reads and bytes",
            set(traffic(tool, "info", path)) == {"reads", "bytes_read"})
 
-    # Few requests to a server that sends several ranges; one more when it does not.
+    # Fewer requests to a server that sends several ranges; at most two more to one that fails to.
     for query in ("inside", "distance"):
         said = [run(tool, query, f"{site}/{fault}/r", points_file, "--raw", "--memory=12MiB",
                     "--stats").stderr.decode()

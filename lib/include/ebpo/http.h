@@ -11,7 +11,8 @@
  *
  * The server must respond to "Range: bytes=a-b" with the status code 206. Opening takes one request
  * for the first 128 KiB, which usually include levels 0 to 4. Data that is needed later is
- * prefetched in requests of up to 4 MiB, several at a time.
+ * prefetched in requests of up to 4 MiB, several at a time. If the server's first response names
+ * nginx or Apache (Server), one request asks for up to 64 ranges.
  *
  * Every response is checked: its range, its size, and the version of the file, which must be equal
  * to the version at opening. The version consists of the file size and the ETag (weak or strong).
