@@ -11,10 +11,10 @@
 #include "query/query_model.h"
 #include "query_support.h"
 
-/* Kernels that count how many sides of boxes they decode for eight children at a time, and how many
- * products of eight numbers they compute. They also count descents: visits of nodes of
- * `counted_accel` at once after the visit of the parent. */
-static uint64_t decoded_sides, products, descents;
+/* Kernels that count how many sides of boxes they decode for eight children at a time, how many
+ * rows of eight numbers they read, and how many products of eight numbers they compute. They also
+ * count descents: visits of nodes of `counted_accel` at once after the visit of the parent. */
+static uint64_t decoded_sides, products, rows_read, descents;
 static const ebpo_accel *counted_accel;
 static void count_descent(const uint8_t *x)
 {
@@ -58,6 +58,11 @@ static void fetch_face(const ebpo_accel *s, uint32_t local)
     faces_fetched++;
     ebpo_accel_fetch_face(s, local);
 }
+EBPO_EIGHT f8 read_row(const float *x)
+{
+    rows_read++;
+    return f8_load(x);
+}
 EBPO_EIGHT f8 multiply(f8 a, f8 b)
 {
     products++;
@@ -77,6 +82,7 @@ EBPO_EIGHT f8 multiply_sub(f8 a, f8 b, f8 c)
 #define ebpo_face_block_open  open_block
 #define ebpo_accel_fetch_face fetch_face
 #define f8_from_bytes         decode_sides
+#define f8_load               read_row
 #define f8_mul                multiply
 #define f8_mul_add            multiply_add
 #define f8_mul_sub            multiply_sub
@@ -401,7 +407,7 @@ static uint64_t count_sides_aside(query_model *m, double aside, uint64_t part, u
                               { (i % SIDE - SIDE / 2) * 0x1p-7 + aside,
                                 (i / SIDE - SIDE / 2) * 0x1p-7, -1 },
                               INFINITY };
-    decoded_sides = products = 0;
+    decoded_sides = products = rows_read = 0;
     for (uint64_t i = 0; i < SIDE * SIDE; i += part)
         ASSERT_OK(ebpo_ray_first_many(m->context, rays + i, part, &options, hits + i, error));
     *hit = 0;
@@ -480,6 +486,23 @@ START_TEST(test_coherent_rays_share_nodes)
     ck_assert_msg(products > 0 && 4 * products < 3 * single_products,
                   "%llu products, single rays %llu", (unsigned long long)products,
                   (unsigned long long)single_products);
+    query_model_free(&m);
+}
+END_TEST
+
+/* A packet whose node only four rays enter tests eight children with each of these rays, and does
+ * not read the values of eight rays for each child. */
+START_TEST(test_few_rays_of_packet_read_few_rows)
+{
+    query_model m;
+    uint64_t hits, single;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    count_sides(&m, 1, &hits);
+    single = rows_read;
+    count_sides(&m, 4, &hits);
+    ck_assert_msg(rows_read > 0 && rows_read < single, "%llu rows, single rays %llu",
+                  (unsigned long long)rows_read, (unsigned long long)single);
     query_model_free(&m);
 }
 END_TEST
@@ -735,6 +758,7 @@ TEST_SUITE(query_ray_many)
     tcase_add_test(many, test_kernel_places_ordinary_rays);
     tcase_add_test(many, test_bundles_miss_together);
     tcase_add_test(many, test_coherent_rays_share_nodes);
+    tcase_add_test(many, test_few_rays_of_packet_read_few_rows);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
     tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
     tcase_add_test(many, test_many_hits_during_turns);
