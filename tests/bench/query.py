@@ -25,7 +25,7 @@ from query_page import Page, figure, handwritten, ratio, reflow, us
 from query_programs import Bench, Model, Server, differences, grown, lengths_of, middle
 import query_checks
 
-SECTIONS = ["rays", "distance", "inside", "memory", "budget", "opening",
+SECTIONS = ["rays", "packets", "distance", "inside", "memory", "budget", "opening",
             "results"]
 MORE = ["leaves", "misses"]  # sections that are printed only if --sections names them
 RAYS = ["uniform", "camera", "segments", "degenerate"]
@@ -181,6 +181,24 @@ def section_tails(page, results):
                 + [us((tails.get("embree") or {}).get("p999_ns"))]
                 for query, points in TAILS for model in dict.fromkeys(models[:1] + models[-1:])
                 if (tails := results[model].get((points, query), {"tails": {}})["tails"]).get("ebpo")])
+
+
+# ---- rays in one call ----
+
+def measure_packets(bench, model):
+    """Return the processor ns per camera ray, by the names of `ray_packets`: the least of seven rounds."""
+    lines = bench.run(bench.build / "tests" / "bench" / "peers" / "ray_packets", model.file, model.ply,
+                      model.queries_of("camera", bench.options.count, True), 7).splitlines()
+    return {name.strip(): float(ns) for name, ns in (line.rsplit(None, 1) for line in lines)}
+
+
+def section_packets(page, packets):
+    page.text("## Rays in one call", "",
+              "Processor ns per camera ray, the minimum of 7 rounds (`ray_packets MODEL MESH.ply RAYS 7`). *one call*: "
+              "`ebpo_ray_first_many`.")
+    page.table(["model", "single calls", "one call", "Embree", "Embree, 8 rays", "one call / 8 rays"],
+               [[model.name] + [figure(p[way]) for way in ("single calls", "one call", "Embree", "Embree, 8 rays")]
+                + [ratio(p["one call"], p["Embree, 8 rays"])] for model, p in packets.items()])
 
 
 # ---- memory and loading ----
@@ -360,7 +378,7 @@ class Made:
 
     def __init__(self, bench):
         self.bench = bench
-        self.results, self.memory = {}, {}
+        self.results, self.packets, self.memory = {}, {}, {}
         self.budget, self.more = [], Page()
         self.found = {"results": None, "misses": None}
 
@@ -368,6 +386,8 @@ class Made:
         page, wanted = Page(), self.bench.options.sections.split(",")
         if "rays" in wanted:
             section_rays(page, self.results)
+        if self.packets:
+            section_packets(page, self.packets)
         for query in ("distance", "inside"):
             if query in wanted:
                 section_points(page, self.results, query, *POINTS[query])
@@ -379,7 +399,7 @@ class Made:
         page.lines += self.more.lines
         query_checks.write(page, self.found)
         write(self.bench.options, self.bench, page,
-              goals_table(self.results, self.memory, self.budget, self.found),
+              goals_table(self.results, self.packets, self.memory, self.budget, self.found),
               summary(self.results, self.memory, self.budget, self.found))
 
 
@@ -433,6 +453,8 @@ def main():
                     key=lambda m: m.faces)
     made = Made(bench)
     query_models(bench, models, made, wanted)
+    if "packets" in wanted:
+        made.packets = {m: measure_packets(bench, m) for m in models}
     if "memory" in wanted:
         made.memory = {m: measure_memory(bench, m) for m in models}
         made.publish(models[-1])
