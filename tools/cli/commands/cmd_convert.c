@@ -228,37 +228,36 @@ typedef struct values {
 
 #include "cli/options/convert.inc"
 
-/* Returns the parts that the text of --parts selects, as bits. Some parts need another part, which
- * a list may omit. For a list with minus signs, the function then omits the parts in need, too. For
- * a list without minus signs, it returns 0. */
+/* Returns the parts that the text of --parts selects, as bits, without the parts that need an
+ * omitted part. */
 static uint32_t listed_parts(const char *text)
 {
     uint32_t parts = 0;
     if (!subset_read_parts(text, DEFAULT_PARTS, &parts))
         return 0;
-    uint32_t usable = parts;
     if (!(parts & EBPO_PART_MESH))
-        usable &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS |
-                              EBPO_PART_BORDER | EBPO_PART_SURFACE);
+        parts &= ~(uint32_t)(EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_COLOURS |
+                             EBPO_PART_BORDER | EBPO_PART_SURFACE);
     if (!(parts & EBPO_PART_ATTRIBUTES))
-        usable &= ~(uint32_t)EBPO_PART_COLOURS;
-    return text[0] == '-' || usable == parts ? usable : 0;
+        parts &= ~(uint32_t)EBPO_PART_COLOURS;
+    return parts;
 }
 
 static int check_parts(const values *v)
 {
-    uint32_t parts;
+    uint32_t requested; /* parts in the list without a minus sign */
     if (!v->parts)
         return EXIT_OK;
     if (v->profile >= 0)
         return command_usage("convert", "--parts and --profile cannot be used together");
-    if (!subset_read_parts(v->parts, DEFAULT_PARTS, &parts))
+    if (!subset_read_parts(v->parts, 0, &requested))
         return command_usage("convert", "--parts: '%s' " SUBSET_PARTS_EXPECTED, v->parts);
-    if (v->parts[0] != '-' && parts != listed_parts(v->parts))
+    uint32_t parts = listed_parts(v->parts);
+    if (requested & ~parts)
         return command_usage("convert",
                              "--parts: maps, attributes, colours, border and surface need "
                              "mesh, and colours need attributes; add them");
-    if (v->embed_textures && !(parts & EBPO_PART_ATTRIBUTES && parts & EBPO_PART_MESH))
+    if (v->embed_textures && !(parts & EBPO_PART_ATTRIBUTES))
         return command_usage("convert", "--embed-textures needs the parts mesh and attributes: "
                                         "textures are among the attributes");
     return EXIT_OK;
@@ -334,8 +333,8 @@ static convert_reported reported_of(const values *v, const char *in, const char 
                                .out = out,
                                .json = v->json,
                                .quiet = v->quiet,
-                               .wants_surface = v->parts && v->parts[0] != '-' &&
-                                                listed_parts(v->parts) & EBPO_PART_SURFACE,
+                               .wants_surface =
+                                   v->parts && listed_parts(v->parts) & EBPO_PART_SURFACE,
                                .timings = v->timings,
                                .repair_requested = v->repairs_wanted.repair,
                                .chosen = chooses_parts(v),

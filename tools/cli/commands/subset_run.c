@@ -60,22 +60,22 @@ static uint32_t part_named(const char *word, size_t length)
 
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts)
 {
-    char sign = text[0] == '-' || text[0] == '+' ? text[0] : 0;
-    uint32_t named = 0;
+    bool changes = text[0] == '-' || text[0] == '+';
+    *parts = changes ? base : 0;
     for (const char *at = text;; at++) {
-        size_t length = strcspn(at, ",");
-        if (sign && at[0] != sign)
+        bool omits = *at == '-';
+        if ((omits || *at == '+') != changes)
             return false;
-        uint32_t part = part_named(at + (sign != 0), length - (sign != 0));
+        at += changes;
+        size_t length = strcspn(at, ",");
+        uint32_t part = part_named(at, length);
         if (!part)
             return false;
-        named |= part;
+        *parts = omits ? *parts & ~part : *parts | part;
         at += length;
         if (!*at)
-            break;
+            return true;
     }
-    *parts = sign == '-' ? base & ~named : sign == '+' ? base | named : named;
-    return true;
 }
 
 int subset_read_target(const char *name, double max_error, const char *target_size,
@@ -147,20 +147,19 @@ ebpo_status subset_set_parts(const subset_values *v, const ebpo_info *info, cons
                  out->last_level, info->level_count - 1);
         return refuse_values(error, shown, what);
     }
-    bool named = v->parts && v->parts[0] != '-';
-    uint32_t requested = 0; /* parts in the list; with plus signs, out->parts has all others too */
-    if (named && subset_read_parts(v->parts, 0, &requested) && requested & ~info->parts) {
+    uint32_t requested = 0; /* parts in the list without a minus sign */
+    if (v->parts && subset_read_parts(v->parts, 0, &requested) && requested & ~info->parts) {
         char parts[80];
         snprintf(what, sizeof what, "--parts requests %s, which the file does not have",
                  words_parts(parts, sizeof parts, requested & ~info->parts));
         return refuse_values(error, shown, what);
     }
     uint32_t of_mesh = EBPO_PART_MAPS | EBPO_PART_ATTRIBUTES | EBPO_PART_BORDER;
-    if (named && out->parts & of_mesh && !(out->parts & EBPO_PART_MESH)) {
+    if (requested & of_mesh && !(out->parts & EBPO_PART_MESH)) {
         char parts[80];
         snprintf(what, sizeof what,
                  "--parts requests %s without the mesh, to which they belong; add mesh",
-                 words_parts(parts, sizeof parts, out->parts & of_mesh));
+                 words_parts(parts, sizeof parts, requested & of_mesh));
         return refuse_values(error, shown, what);
     }
     if (!v->parts && v->profile < 0 && out->last_level >= 0 &&

@@ -26,8 +26,8 @@ typedef struct subset_values {
 extern const char *const profile_words[]; /* by ebpo_profile; NULL-terminated */
 
 /* Reads --parts, a list of part names separated by commas. Without signs, *parts becomes the named
- * parts. With a minus sign before each name, it becomes `base` without the named parts; with a plus
- * sign, `base` and the named parts. Returns false if the list is invalid. */
+ * parts. With a minus or plus sign before each name, it becomes `base` without or with these parts.
+ * Returns false if the list is invalid. */
 bool subset_read_parts(const char *text, uint32_t base, uint32_t *parts);
 #define SUBSET_PARTS_EXPECTED                                                                     \
     "is not a list of mesh, maps, attributes, envelopes, leaf-planes, colours, border, surface, " \
