@@ -137,7 +137,8 @@ typedef struct ebpo_slot {
     bool is_pinned;
     ebpo_http_response response;
     ebpo_redirect redirect;
-    bool joined; /* the attempt asks for several ranges */
+    bool joined;      /* the attempt asks for several ranges */
+    double variation; /* of the pause after the attempt, 0 to 1 */
     /* has_verdict: `verdict` is set. stopped: a callback below has ended the transfer. stalled:
      * check_stall has ended the transfer, because no bytes arrived */
     bool has_verdict, stopped, stalled;
@@ -580,17 +581,17 @@ static void finish_request(ebpo_transfers *t, ebpo_request *r, ebpo_status statu
 
 /* --- attempts; only the thread calls the functions below --- */
 
-/* Returns the seconds until the next attempt. The pause doubles with each failure and is varied at
- * random, so that many readers do not repeat their requests at the same time. If the server
- * requires a longer pause, returns the server's pause, and *by_server is true. */
-static double pause_after(ebpo_transfers *t, const ebpo_slot *s, bool *by_server)
+/* Returns the seconds until the next attempt. The pause doubles with each failure. It is varied at
+ * random, so that many readers do not repeat their requests at the same time, but equal for
+ * requests that shared an attempt, so that they can share the next one. If the server requires a
+ * longer pause, returns the server's pause, and *by_server is true. */
+static double pause_after(const ebpo_slot *s, bool *by_server)
 {
     curl_off_t retry_after = 0;
     double pause = PAUSE_FIRST;
     for (unsigned i = 1; i < s->request->failures && pause < PAUSE_MAX; i++)
         pause *= 2;
-    pause = (pause < PAUSE_MAX ? pause : PAUSE_MAX) *
-            (0.5 + 0.5 * ebpo_random_unit(ebpo_random_next(&t->random)));
+    pause = (pause < PAUSE_MAX ? pause : PAUSE_MAX) * (0.5 + 0.5 * s->variation);
     if (s->has_verdict && s->verdict == EBPO_HTTP_LATER)
         curl_easy_getinfo(s->easy, CURLINFO_RETRY_AFTER, &retry_after);
     *by_server = (double)retry_after > pause;
@@ -605,12 +606,13 @@ static bool may_join(const ebpo_transfers *t, const ebpo_request *r)
     return *v->etag || *v->modified || t->options->unversioned;
 }
 
-/* Returns true if a request may share an attempt with others. After a failure, it may not. Neither
- * may it late in its time limit, because the attempt ends with the first limit of its requests. */
+/* Returns true if a request may share an attempt with others. After two failures, it may not.
+ * Neither may it late in its time limit, because the attempt ends with the first limit of its
+ * requests. */
 static bool can_share(const ebpo_transfers *t, const ebpo_request *r, double now)
 {
     bool late = r->deadline > 0 && r->deadline - now < t->options->time_limit / 2;
-    return t->joining != JOINING_FAILS && t->is_pinned && may_join(t, r) && !r->failures &&
+    return t->joining != JOINING_FAILS && t->is_pinned && may_join(t, r) && r->failures < 2 &&
            !r->got && r->due <= now && !late;
 }
 
@@ -677,6 +679,7 @@ static void begin_attempt(ebpo_transfers *t, ebpo_slot *s, ebpo_request *r, doub
         s->request = &s->extra;
     }
     s->joined = s->request->next != NULL;
+    s->variation = ebpo_random_unit(ebpo_random_next(&t->random));
     write_ranges(s->request, range, sizeof range);
     curl_easy_setopt(s->easy, CURLOPT_RANGE, range);
     if (s->redirect.at || s->redirect.elsewhere) /* the previous attempt was redirected */
@@ -777,7 +780,7 @@ static void try_again(ebpo_transfers *t, ebpo_slot *s, CURLcode code, double now
     describe_error(s, code, what, sizeof what);
     r->failures++;
     bool by_server;
-    double pause = pause_after(t, s, &by_server);
+    double pause = pause_after(s, &by_server);
     if (now >= r->deadline - 0.01 || (!by_server && now + pause >= r->deadline))
         snprintf(why, sizeof why,
                  "bytes %" PRIu64 " to %" PRIu64

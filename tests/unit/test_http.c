@@ -356,35 +356,35 @@ START_TEST(test_http_prefetch_uses_few_requests)
 END_TEST
 
 /* Responses to requests for several ranges: faults of faulty_server.py. Requests: the head; the
- * first range with the first byte; 40 ranges together. If the server fails, each range is requested
- * alone, and no request is for several ranges again. */
+ * first range with the first byte; 40 ranges together. After a wrong response, each range is
+ * requested alone, and no request is for several ranges again. */
 static const struct {
     unsigned what, requests, retries;
 } several[] = {
-    { 0, 3, 0 },    /* valid */
-    { 1, 3, 0 },    /* the boundary is not quoted */
-    { 2, 3, 0 },    /* the last part first */
-    { 3, 4, 1 },    /* cut off once: the last range is requested again */
-    { 4, 43, 0 },   /* the whole file */
-    { 5, 43, 0 },   /* no boundary */
-    { 6, 43, 0 },   /* a boundary that is too long */
-    { 7, 43, 0 },   /* another boundary */
-    { 8, 43, 0 },   /* only the first part */
-    { 9, 43, 0 },   /* the first part twice */
-    { 10, 43, 0 },  /* a part that was not requested */
-    { 11, 43, 0 },  /* another offset */
-    { 12, 43, 0 },  /* another size of the file */
-    { 13, 43, 0 },  /* more bytes than Content-Range states */
-    { 14, 43, 0 },  /* a long line */
-    { 15, 43, 0 },  /* many lines */
-    { 16, 43, 0 },  /* text before the first part */
-    { 17, 43, 0 },  /* Content-Encoding */
-    { 18, 43, 0 },  /* longer parts than requested */
-    { 19, 43, 0 },  /* one part for both ranges */
-    { 20, 43, 0 },  /* status 416 */
-    { 21, 43, 0 },  /* another ETag only in responses with several ranges */
-    { 23, 43, 40 }, /* status 503 once: all are requested again, alone */
-    { 24, 43, 1 },  /* a closed connection */
+    { 0, 3, 0 },   /* valid */
+    { 1, 3, 0 },   /* the boundary is not quoted */
+    { 2, 3, 0 },   /* the last part first */
+    { 3, 4, 1 },   /* cut off once: the last range is requested again */
+    { 4, 43, 0 },  /* the whole file */
+    { 5, 43, 0 },  /* no boundary */
+    { 6, 43, 0 },  /* a boundary that is too long */
+    { 7, 43, 0 },  /* another boundary */
+    { 8, 43, 0 },  /* only the first part */
+    { 9, 43, 0 },  /* the first part twice */
+    { 10, 43, 0 }, /* a part that was not requested */
+    { 11, 43, 0 }, /* another offset */
+    { 12, 43, 0 }, /* another size of the file */
+    { 13, 43, 0 }, /* more bytes than Content-Range states */
+    { 14, 43, 0 }, /* a long line */
+    { 15, 43, 0 }, /* many lines */
+    { 16, 43, 0 }, /* text before the first part */
+    { 17, 43, 0 }, /* Content-Encoding */
+    { 18, 43, 0 }, /* longer parts than requested */
+    { 19, 43, 0 }, /* one part for both ranges */
+    { 20, 43, 0 }, /* status 416 */
+    { 21, 43, 0 }, /* another ETag only in responses with several ranges */
+    { 23, 4, 1 },  /* status 503 once: all are requested again, together */
+    { 24, 43, 1 }, /* a closed connection */
 };
 
 START_TEST(test_http_several_ranges_take_one_request)
