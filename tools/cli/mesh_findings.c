@@ -190,9 +190,9 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     bool crossings_follow)
 {
     char bytes[32], parts[64], volume[FINDINGS_VOLUME];
-    fprintf(out, "%s: %llu vertices, %llu faces", path, (unsigned long long)mesh->vertex_count,
-            (unsigned long long)mesh->face_count);
-    if (mesh->source_format[0])
+    fprintf(out, "%s: %llu vertices, %llu faces", path ? path : "after repair",
+            (unsigned long long)mesh->vertex_count, (unsigned long long)mesh->face_count);
+    if (path && mesh->source_format[0])
         fprintf(out, " (%s, %s, %s)", mesh->source_format,
                 words_bytes(bytes, sizeof bytes, mesh->source_size),
                 mesh->xyz32 ? "float" : "double");
@@ -213,7 +213,8 @@ void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
     fprintf(out, ", mean edge %.4g\n  box %.6g %.6g %.6g to %.6g %.6g %.6g\n", report->mean_edge,
             report->min[0], report->min[1], report->min[2], report->max[0], report->max[1],
             report->max[2]);
-    print_reading(out, mesh);
+    if (path)
+        print_reading(out, mesh);
     print_findings(out, report);
     if (!crossings_follow)
         fputs("  not checked: intersecting faces (ebpo check --crossings)\n", out);

@@ -26,7 +26,8 @@ const char *findings_volume(char text[FINDINGS_VOLUME], const ebpo_solid_volume 
 void findings_volume_json(json *j, const ebpo_solid_volume *solid);
 /* Prints the kind of the mesh, each kind of finding (defect) with its first faces or vertices, and
  * a note that intersecting faces were not searched. `crossings_follow`: the caller searches them
- * later, so the note is not printed. */
+ * later, so the note is not printed. `path`: of the source; NULL: the mesh is one after repairs,
+ * and the facts about its source are not printed. */
 void findings_print(FILE *out, const char *path, const ebpo_mesh *mesh,
                     const ebpo_mesh_report *report, const ebpo_solid_volume *solid,
                     bool crossings_follow);

@@ -173,7 +173,7 @@ static void print_reports(const values *v, const mesh_input *p, const char *path
     if (!p->prepared.was_repaired)
         return;
     findings_print_repair(stdout, &p->prepared.record);
-    findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, &after, v->crossings);
+    findings_print(stdout, NULL, &p->mesh, &p->prepared.report, &after, v->crossings);
 }
 
 static void print_words(const values *v, const mesh_input *p, const char *path)

@@ -49,7 +49,7 @@ static void convert_report_mesh(const convert_reported *t, const mesh_input *p)
         advice_print(stdout, p);
         findings_print_repair(stdout, &p->prepared.record);
         if (p->prepared.was_repaired)
-            findings_print(stdout, "after repair", &p->mesh, &p->prepared.report, &after, false);
+            findings_print(stdout, NULL, &p->mesh, &p->prepared.report, &after, false);
         advice_print_shells(stdout, p);
     }
     command_flush("convert");
