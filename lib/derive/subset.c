@@ -303,6 +303,9 @@ static ebpo_status cut_surface(ebpo_cutting *c)
     if (surface->patch_count == 0)
         c->parts &= ~(uint32_t)EBPO_PART_SURFACE;
     ebpo_surface_summarise(surface, &c->out->info);
+    ebpo_check check = ebpo_reader_check(c->file, NULL); /* names the input in messages */
+    if (status == EBPO_OK && surface->patch_count)
+        status = ebpo_check_surface(&check, &c->out->info, surface, c->error);
     free(list);
     free(kept);
     ebpo_patch_table_free(&table);

@@ -654,7 +654,8 @@ ebpo_status ebpo_patch_code_fails(ebpo_status as, const char *file, ebpo_error *
 {
     return ebpo_fail_at(error, as, file, "/surface/triangles", -1,
                         "the code of a patch is wrong: an earlier version of ebpo wrote it, or it "
-                        "is damaged; convert the model again with --parts=+surface");
+                        "is damaged; 'ebpo subset --parts=-surface' removes all patches, and 'ebpo "
+                        "repack --parts=+surface' makes them again");
 }
 
 static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, uint64_t code_bytes,
