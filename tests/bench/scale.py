@@ -110,19 +110,19 @@ def run_query(scale, file, query, count, *arguments, seed=1):
                      "--points", "path", "--count", count, "--seed", seed, "--json", *arguments)
 
 
-def measure_queries(scale, file):
-    """Measure opening with one query, and a path, at full speed and at a haptic device's rate.
+def measure_queries(scale, file, largest):
+    """Measure opening with one query; for the largest model also a path, at full speed and at a haptic device's rate.
 
     The one query is near the surface, so it must load data, and at another position each time.
     """
     o = scale.options
     return {query: {"open": [run_query(scale, file, query, 1, seed=seed) for seed in range(1, OPENINGS + 1)],
-                    "path": run_query(scale, file, query, o.count, "--prefetch"),
-                    "rate": run_query(scale, file, query, o.rate_count, "--prefetch", "--rate", 1000)}
+                    "path": largest and run_query(scale, file, query, o.count, "--prefetch"),
+                    "rate": largest and run_query(scale, file, query, o.rate_count, "--prefetch", "--rate", 1000)}
             for query in ("inside", "distance")}
 
 
-def study(scale, millions):
+def study(scale, millions, largest):
     ply, command, made = generate(scale, millions)
     file = ply.with_suffix(".ebpo.h5")
     others = [ply.with_suffix(f".{kind}.ebpo.h5") for kind in ("bare", "first")]
@@ -138,7 +138,7 @@ def study(scale, millions):
     verified = [scale.run(scale.ebpo, "verify", "--json", *scale.verify_options, file, cold=file,
                           accept=(0, 1)) for _ in range(scale.rounds(faces))]  # 1: violations, which are reported
     result["verify"] = [v for v in verified if v]
-    result["queries"] = measure_queries(scale, file)
+    result["queries"] = measure_queries(scale, file, largest)
     for path in others:
         path.unlink(missing_ok=True)
     return result
@@ -406,8 +406,9 @@ def parse():
 def main():
     options = parse()
     scale, results = Scale(options), []
-    for millions in sorted(float(s) for s in options.sizes.split(",")):
-        results.append(study(scale, millions))
+    sizes = sorted(float(s) for s in options.sizes.split(","))
+    for millions in sizes:
+        results.append(study(scale, millions, millions == sizes[-1]))
         write(scale, results)  # the page is complete after each model
         if options.json:
             pathlib.Path(options.json).write_text(json.dumps({"machine": measured.machine(),
