@@ -1,12 +1,12 @@
 /* Keeps items in caches under a memory budget. A pool is a budget that several caches share; a
  * cache with a separate budget has its own pool. A slot is the record of one key of one cache. A
- * pool has one lock, one table of slots, and one order of last use for all its caches. Memory for
- * an item is reserved before the item is loaded, and the lock is not held while a source loads or
- * releases items. While an item is loaded, its slot is LOADING, and threads that need the same key
- * wait. Waiting reservations are served in order of arrival; otherwise a large reservation might
- * wait for ever. A prefetch is a list of keys that the caller will need soon. A background thread
- * loads their items. To free memory, this thread drops no item that is in use or in the same
- * prefetch. */
+ * pool has one lock and one table of slots for all its caches, and keeps the order of last use of
+ * small items apart from that of large items. Memory for an item is reserved before the item is
+ * loaded, and the lock is not held while a source loads or releases items. While an item is loaded,
+ * its slot is LOADING, and threads that need the same key wait. Waiting reservations are served in
+ * order of arrival; otherwise a large reservation might wait for ever. A prefetch is a list of keys
+ * that the caller will need soon. A background thread loads their items. To free memory, this
+ * thread drops no item that is in use or in the same prefetch. */
 #include <inttypes.h>
 #include <pthread.h>
 #include <signal.h>
@@ -38,12 +38,22 @@ typedef struct cache_slot {
     struct cache_slot *older, *newer; /* READY and not pinned: neighbours in order of last use */
 } cache_slot;
 
+/* Items that are not pinned, in the order of last use. */
+typedef struct cache_order {
+    cache_slot *oldest, *newest;
+    uint64_t bytes; /* sum of the items */
+} cache_order;
+
+/* A small item has at most SMALL bytes. Its load takes more time for each byte than that of a large
+ * item, so large items are dropped first, unless small items take more than half of the budget. */
+enum { SMALL = 2048 };
+
 /* The slots of all caches that share a budget. This is a hash table with chains, because keys are
  * also removed, which the tables of core/hash.h do not allow. */
 typedef struct cache_slots {
     cache_slot **bucket; /* [bucket_count], a power of two */
     uint64_t bucket_count, count;
-    cache_slot *oldest, *newest; /* order of last use of the items that are not pinned */
+    cache_order order[2]; /* of large items, and of small items */
 } cache_slots;
 
 struct ebpo_cache_pool {
@@ -180,20 +190,24 @@ static void remove_slot(cache_slots *t, cache_slot *s)
 /* Adds a slot to the order of last use, as the newest. */
 static void link_slot(cache_slots *t, cache_slot *s)
 {
-    s->older = t->newest;
+    cache_order *o = &t->order[s->bytes <= SMALL];
+    s->older = o->newest;
     s->newer = NULL;
-    *(t->newest ? &t->newest->newer : &t->oldest) = s;
-    t->newest = s;
+    *(o->newest ? &o->newest->newer : &o->oldest) = s;
+    o->newest = s;
+    o->bytes += s->bytes;
 }
 
 /* Removes a slot from the order of last use. */
 static void unlink_slot(cache_slots *t, cache_slot *s)
 {
-    *(s->older ? &s->older->newer : &t->oldest) = s->newer;
-    *(s->newer ? &s->newer->older : &t->newest) = s->older;
+    cache_order *o = &t->order[s->bytes <= SMALL];
+    *(s->older ? &s->older->newer : &o->oldest) = s->newer;
+    *(s->newer ? &s->newer->older : &o->newest) = s->older;
+    o->bytes -= s->bytes;
 }
 
-/* --- reservations in a budget: the least recently used item of any cache is dropped first --- */
+/* --- reservations in a budget, for which items of any cache are dropped --- */
 
 /* Adds `bytes` to the bytes in use of the pool and of the cache `c` (NULL: no cache). */
 static void count_bytes(ebpo_cache_pool *p, ebpo_cache *c, uint64_t bytes)
@@ -276,7 +290,22 @@ static uint64_t least_budget(const ebpo_cache_pool *p, const cache_demand *d)
     return saturated_sum(saturated_sum(used, kept_for(p, d)), d->aside ? 0 : d->peak);
 }
 
-/* Reserves d->peak bytes. Drops the least recently used items if necessary. */
+/* Drops the oldest items of an order until *total, the bytes that the pool needs, fit the budget.
+ */
+static void drop_oldest(ebpo_cache_pool *p, const cache_demand *d, const cache_order *order,
+                        uint64_t *total, cache_slot **leaving)
+{
+    for (cache_slot *s = order->oldest, *newer; s && *total > p->budget; s = newer) {
+        newer = s->newer;
+        if (d->ahead && s->owner == d->cache && is_in_prefetch(d->cache, s->key))
+            continue;
+        *total -= s->bytes;
+        s->owner->stats.evicted++;
+        drop_item(p, s, leaving);
+    }
+}
+
+/* Reserves d->peak bytes. Drops items if necessary. */
 static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
 {
     while (p->budget && saturated_sum(p->bytes, d->peak) > p->budget) {
@@ -286,15 +315,11 @@ static cache_capacity reserve_space(ebpo_cache_pool *p, const cache_demand *d)
         if (saturated_sum(least, p->passing) > p->budget)
             return CAPACITY_LATER;
         cache_slot *leaving = NULL;
+        cache_order *order = p->slots.order;
         uint64_t total = saturated_sum(p->bytes, d->peak);
-        for (cache_slot *s = p->slots.oldest, *newer; s && total > p->budget; s = newer) {
-            newer = s->newer;
-            if (d->ahead && s->owner == d->cache && is_in_prefetch(d->cache, s->key))
-                continue;
-            total -= s->bytes;
-            s->owner->stats.evicted++;
-            drop_item(p, s, &leaving);
-        }
+        bool small_first = order[1].bytes > p->budget / 2;
+        drop_oldest(p, d, &order[small_first], &total, &leaving);
+        drop_oldest(p, d, &order[!small_first], &total, &leaving);
         release_leaving(p, leaving);
     }
     count_bytes(p, d->cache, d->peak);
@@ -773,11 +798,12 @@ ebpo_status ebpo_cache_make(ebpo_cache **out, const ebpo_cache_source *source, c
 static void drop_unpinned(ebpo_cache *c)
 {
     cache_slot *leaving = NULL;
-    for (cache_slot *s = c->pool->slots.oldest, *newer; s; s = newer) {
-        newer = s->newer;
-        if (s->owner == c)
-            drop_item(c->pool, s, &leaving);
-    }
+    for (int small = 0; small < 2; small++)
+        for (cache_slot *s = c->pool->slots.order[small].oldest, *newer; s; s = newer) {
+            newer = s->newer;
+            if (s->owner == c)
+                drop_item(c->pool, s, &leaving);
+        }
     release_leaving(c->pool, leaving);
 }
 

@@ -1,6 +1,6 @@
 /* Provides caches. A cache finds items by keys, and loads missing items, under a memory budget that
- * several caches may share. The least recently used items are dropped first. Any thread may call
- * these functions. */
+ * several caches may share. The least recently used items are dropped first; small items are kept
+ * longer than large ones. Any thread may call these functions. */
 #ifndef EBPO_CORE_CACHE_H
 #define EBPO_CORE_CACHE_H
 
@@ -42,8 +42,7 @@ typedef struct ebpo_cache_stats {
 /* Greatest number of keys of a prefetch. */
 enum { EBPO_CACHE_AHEAD = 64 };
 
-/* A budget that caches share: the least recently used items of all these caches are dropped first.
- */
+/* A budget that caches share: items of all these caches are dropped in one order. */
 typedef struct ebpo_cache_pool ebpo_cache_pool;
 
 EBPO_MUST_USE ebpo_status ebpo_cache_pool_make(ebpo_cache_pool **out, uint64_t budget,

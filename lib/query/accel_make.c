@@ -340,15 +340,15 @@ typedef struct listing {
 } listing;
 
 /* Adds a face to the leaf's list. Faces are added in ascending order, so consecutive faces of one
- * block become one entry. There is no branch on new entries, because the processor could not
- * predict it. */
+ * block become one entry. A mask, and not a branch, starts new entries, because the processor could
+ * not predict the branch. */
 static inline void list_face(const walk *w, uint64_t face, listing *l)
 {
     uint32_t slot = w->slot_of[face], block = slot / EBPO_BLOCK;
     uint64_t lane = UINT64_C(1) << (slot % EBPO_BLOCK + EBPO_LISTED_LANES);
-    bool is_new = block != l->block;
-    l->last = (is_new ? block : l->last) | lane;
-    l->count += is_new;
+    uint64_t is_new = block != l->block;
+    l->last = (l->last & (is_new - 1)) | block | lane;
+    l->count += (uint32_t)is_new;
     l->block = block;
     ebpo_list(&l->list[l->count - 1], l->last);
 }

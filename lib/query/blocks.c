@@ -315,21 +315,21 @@ static void find_vertices(const job *j, uint64_t block)
 {
     unsigned corners, count = 0;
     const uint32_t *corner = corners_of(j, block, &corners);
-    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* one more for the searched vertex */
+    uint32_t vertex[EBPO_MESHLET_VERTICES + 1]; /* [entry]; element 0 is the searched vertex */
     uint8_t table[TABLE] = { 0 };
     for (unsigned i = 0; i < corners; i++) {
-        unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS), at;
-        /* The vertex is stored before it is known to be new, so that a free slot compares as equal:
-         * a branch on new vertices would be unpredictable. Collisions are rare. */
-        vertex[count] = corner[i];
-        for (;; slot = (slot + 1) % TABLE) {
-            at = table[slot] ? table[slot] - 1u : count;
-            if (vertex[at] == corner[i])
-                break;
-        }
-        table[slot] = (uint8_t)(at + 1);
-        j->layout->corners[block].at[i] = (uint8_t)at;
-        count += at == count;
+        unsigned slot = corner[i] * UINT32_C(0x9e3779b1) >> (32 - TABLE_BITS);
+        /* A free slot compares as equal, and masks choose the entry: a branch on new vertices would
+         * be unpredictable. Collisions are rare. */
+        vertex[0] = corner[i];
+        while (vertex[table[slot]] != corner[i])
+            slot = (slot + 1) % TABLE;
+        unsigned entry = table[slot], is_new = entry == 0;
+        count += is_new;
+        entry |= count & (0 - is_new);
+        vertex[entry] = corner[i];
+        table[slot] = (uint8_t)entry;
+        j->layout->corners[block].at[i] = (uint8_t)(entry - 1);
     }
     j->layout->corners[block].count = (uint8_t)count;
 }

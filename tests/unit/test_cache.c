@@ -332,6 +332,29 @@ END_TEST
 
 /* Items are evicted for a reservation, except items in use. A load that would need the reserved
  * memory is refused before memory is taken. */
+START_TEST(test_cache_keeps_small_items_longer)
+{
+    begin_with(16 << 10, 4 << 10, 4 << 10);
+    for (uint64_t key = 0; key < 8; key++)
+        src->size[key] = src->peak[key] = 1 << 10;
+    for (uint64_t key = 0; key < 7; key++)
+        use(key);
+    for (uint64_t key = 10; key < 20; key++) /* two of these fit beside the small items */
+        use(key);
+    ck_assert_uint_eq(stats().evicted, 8);
+    for (uint64_t key = 0; key < 7; key++)
+        ck_assert(use(key));
+    ck_assert(use(18) && use(19));
+    /* With more than half of the budget, small items are not kept longer. */
+    src->size[7] = src->peak[7] = 2 << 10;
+    use(7);
+    ck_assert(!ebpo_cache_has(cache, 18) && use(19));
+    use(20);
+    ck_assert(!ebpo_cache_has(cache, 0) && ebpo_cache_has(cache, 19));
+    finish();
+}
+END_TEST
+
 START_TEST(test_cache_reserve_evicts_items_when_needed)
 {
     begin_with(400, 100, 100);
@@ -878,11 +901,12 @@ START_TEST(test_budget_holds_with_threads_and_prefetch)
 {
     hammer h[4];
     uint64_t random = 1 + (uint64_t)_i;
-    begin_with(_i == 0 ? 700 : _i == 1 ? 3000 : 400, 0, 0);
+    uint64_t unit = _i == 3 ? 40 : 1; /* 40: small and large items */
+    begin_with(unit * (_i == 1 ? 3000 : _i == 2 ? 400 : 700), 0, 0);
     src->jitter = true;
     for (int i = 0; i < KEYS; i++) {
-        src->size[i] = 20 + ebpo_test_random(&random) % 100;
-        src->peak[i] = src->size[i] + ebpo_test_random(&random) % 80;
+        src->size[i] = unit * (20 + ebpo_test_random(&random) % 100);
+        src->peak[i] = src->size[i] + unit * (ebpo_test_random(&random) % 80);
         src->failing[i] = i % 50 == 49;
     }
     for (int i = 0; i < 4; i++) {
@@ -907,6 +931,7 @@ TEST_SUITE(cache)
     TCase *tests = tcase_create("cache");
     tcase_set_timeout(tests, 300);
     tcase_add_loop_test(tests, test_cache_random_operations_match_model, 1, 6);
+    tcase_add_test(tests, test_cache_keeps_small_items_longer);
     tcase_add_test(tests, test_cache_reserve_evicts_items_when_needed);
     tcase_add_test(tests, test_shared_budget_evicts_least_recently_used);
     tcase_add_test(tests, test_shared_budget_permanent_use_evicts_items);
@@ -927,7 +952,7 @@ TEST_SUITE(cache)
     tcase_add_test(tests, test_get_waits_for_memory_of_prefetch);
     tcase_add_test(tests, test_prefetch_failures_are_silent);
     tcase_add_test(tests, test_cache_free_stops_prefetch);
-    tcase_add_loop_test(tests, test_budget_holds_with_threads_and_prefetch, 0, 3);
+    tcase_add_loop_test(tests, test_budget_holds_with_threads_and_prefetch, 0, 4);
     suite_add_tcase(suite, tests);
     return suite;
 }
