@@ -28,7 +28,7 @@
     static inline const type *name##_best(void) { return &name##_base; }
 #endif
 
-/* Returns true if this processor has AVX2 and FMA (x86-64-v3). */
+/* Returns true if this processor has AVX2, FMA, BMI1 and BMI2 (x86-64-v3). */
 bool ebpo_cpu_has_v3(void);
 
 #endif

@@ -77,32 +77,27 @@ EBPO_EIGHT f8 f8_abs(f8 a)
 }
 /* Eight numbers below 16, which select from the 16 floats of an f8_table (f8_look_up). */
 typedef struct n8 {
-    /* low: the numbers; only their lower three bits are used. high: a mask in which a lane is set
-     * if its number is at least 8 */
+    /* low: the numbers; only their lower three bits are used. high: a lane's upper bit is set if
+     * its number is at least 8 */
     __m256i low, high;
 } n8;
 typedef struct f8_table {
-    f8 first;
-    __m256i
-        difference; /* exclusive or of the bits of floats 0 to 7 with the bits of floats 8 to 15 */
+    f8 low, high; /* floats 0 to 7, floats 8 to 15 */
 } f8_table;
 EBPO_EIGHT n8 n8_from_bits(uint32_t bits)
 {
     __m256i x = _mm256_srlv_epi32(_mm256_set1_epi32((int)bits),
                                   _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28));
-    return (n8){ x, _mm256_srai_epi32(_mm256_slli_epi32(x, 28), 31) };
+    return (n8){ x, _mm256_slli_epi32(x, 28) };
 }
 EBPO_EIGHT f8_table f8_table_load(const float *x)
 {
-    f8 first = f8_load(x);
-    return (f8_table){ first, _mm256_castps_si256(_mm256_xor_ps(first, f8_load(x + 8))) };
+    return (f8_table){ f8_load(x), f8_load(x + 8) };
 }
 EBPO_EIGHT f8 f8_look_up(f8_table t, n8 at)
 {
-    __m256i difference =
-        _mm256_and_si256(_mm256_permutevar8x32_epi32(t.difference, at.low), at.high);
-    return _mm256_xor_ps(_mm256_permutevar8x32_ps(t.first, at.low),
-                         _mm256_castsi256_ps(difference));
+    return f8_pick(_mm256_castsi256_ps(at.high), _mm256_permutevar8x32_ps(t.high, at.low),
+                   _mm256_permutevar8x32_ps(t.low, at.low));
 }
 EBPO_EIGHT f8 f8_from_bytes(const uint8_t *x)
 {
@@ -451,7 +446,7 @@ typedef __m256d d3; /* the fourth lane is unused */
 EBPO_EIGHT d3 d3_all(double x) { return _mm256_set1_pd(x); }
 EBPO_EIGHT d3 d3_load(const double x[3])
 {
-    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(x)), _mm_load_sd(x + 2), 1);
+    return _mm256_insertf128_pd(_mm256_castpd128_pd256(_mm_loadu_pd(x)), _mm_loaddup_pd(x + 2), 1);
 }
 EBPO_EIGHT d3 d3_add(d3 a, d3 b) { return _mm256_add_pd(a, b); }
 EBPO_EIGHT d3 d3_sub(d3 a, d3 b) { return _mm256_sub_pd(a, b); }

@@ -253,10 +253,14 @@ typedef struct ebpo_accel {
     char *meshlets;         /* [units][EBPO_MESHLET_UNIT]: records of all blocks (ebpo_meshlet) */
     uint64_t units;
     uint32_t face_count;
-    double centre[3], scale;       /* of the frame */
-    float turn_error_constant;     /* part of an error bound for blocks of floats; see
-                                    * query/inside_kernels.c */
-    double largest_coordinate;     /* upper bound for decoded boxes, in the frame; at least 1 */
+    double centre[3], scale;   /* of the frame */
+    float turn_error_constant; /* part of an error bound for blocks of floats; see
+                                * query/inside_kernels.c */
+    double largest_coordinate; /* upper bound for decoded boxes, in the frame; at least 1 */
+    /* A ray whose origin has no coordinate above ray_near, in the frame, is searched without moving
+     * the origin, with ray_error and ray_blur (ebpo_ray_search.error and blur). -1: no ray */
+    double ray_near, ray_error;
+    float ray_blur;
     ebpo_bound *bound;             /* [bound_count] the hierarchy over blocks */
     ebpo_bound_cylinder *cylinder; /* [bound_count] */
     uint32_t bound_count;

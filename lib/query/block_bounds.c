@@ -20,6 +20,7 @@
 #include "core/os.h"
 #include "core/parallel.h"
 #include "query/accel_parts.h"
+#include "query/query_kernels.h"
 
 /* Maximum number of blocks in a bounding cylinder: the faces of more blocks are usually too curved
  * for a thin cylinder. */
@@ -504,6 +505,15 @@ static ebpo_status fill_levels(job *j, unsigned threads, ebpo_error *error)
     return status;
 }
 
+/* Sets the constants of rays whose origins are near. */
+static void set_near_rays(ebpo_accel *s)
+{
+    double near = EBPO_RAY_NEAR * s->largest_coordinate;
+    s->ray_error = ebpo_ray_error(s, near);
+    s->ray_blur = ebpo_ray_blur(s->ray_error);
+    s->ray_near = near < 0x1p30 && s->scale > 0 && s->scale < INFINITY ? near : -1;
+}
+
 ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
                                    ebpo_error *error)
 {
@@ -516,6 +526,7 @@ ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, uns
         status = fill_levels(&j, threads, error);
     if (status == EBPO_OK && s->bound_count)
         s->largest_coordinate = larger_of(1, greatest_coordinate(&s->bound[s->root_bound]));
+    set_near_rays(s);
     free(j.of_block);
     free(j.of_node);
     return status;

@@ -163,6 +163,9 @@ static inline double ebpo_ray_error(const ebpo_accel *s, double greatest)
     return 0x1p-45 * (greatest + unit) + 0x1p-55 * s->largest_coordinate + 0x1p-53;
 }
 
+/* Returns the distance at which other rounding errors equal the origin's error. */
+static inline float ebpo_ray_blur(double error) { return (float)(error * 0x1p23 + 0x1p-30); }
+
 typedef enum ebpo_ray_wants { EBPO_WANTS_FIRST, EBPO_WANTS_ANY, EBPO_WANTS_ALL } ebpo_ray_wants;
 
 typedef struct ebpo_ray_search ebpo_ray_search;
@@ -216,8 +219,10 @@ struct ebpo_ray_search {
      * sides */
     const uint8_t (*side_at)[3];
     int axis[3]; /* the axes x, y, z of tests of faces; z has the direction's longest coordinate */
-    float shear[3];                  /* how x, y and t change for a step of 1 along z */
-    float from_high[4], from_low[4]; /* `from` in two parts, for blocks of floats */
+    /* how far the shear moves x and y at z = 1, and how t changes for a step of 1 along z */
+    float shear[3];
+    /* for blocks of floats: `from` is from_high - from_low / scale */
+    float from_high[4], from_low[4];
     ebpo_ray_candidate waiting[EBPO_RAY_CANDIDATES];
 };
 

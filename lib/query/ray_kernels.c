@@ -43,15 +43,15 @@ static const uint8_t ray_side_at[8][2][3] = {
 EBPO_EIGHT bool ray_place(ebpo_ray_search *r, d3 from, d3 d, d3 origin)
 {
     const ebpo_accel *s = r->s;
-    double longest = d3_greatest(d3_abs(d)), near = EBPO_RAY_NEAR * s->largest_coordinate;
-    if (!(longest >= EBPO_RAY_SHORTEST && longest <= EBPO_RAY_LONGEST && near < 0x1p30 &&
-          d3_greatest(d3_abs(origin)) <= near && s->scale > 0 && s->scale < INFINITY))
+    double longest = d3_greatest(d3_abs(d));
+    if (!(longest >= EBPO_RAY_SHORTEST && longest <= EBPO_RAY_LONGEST &&
+          d3_greatest(d3_abs(origin)) <= s->ray_near))
         return false;
     d3_store(r->direction, d);
     d3_store(r->origin, origin);
     d3_store(r->from, from);
-    r->error = ebpo_ray_error(s, near); /* not that of this origin, for which the walk would wait */
-    r->blur = (float)(r->error * 0x1p23 + 0x1p-30);
+    r->error = s->ray_error; /* not that of this origin, for which the walk would wait */
+    r->blur = s->ray_blur;
     r->moved = 0;
     r->limit_scale = s->scale;
     double beyond = (double)EBPO_RAY_BEYOND, limit = r->limit * s->scale * (1 + 0x1p-20) + 0x1p-90,
@@ -85,10 +85,10 @@ EBPO_EIGHT void ray_set_faces(ebpo_ray_search *r, d3 from)
     memcpy(r->axis, axes[(y > x) | (fabs(d[2]) > longer) << 1], sizeof r->axis);
     int z = r->axis[2];
     for (int i = 0; i < 2; i++)
-        r->shear[i] = (float)(d[r->axis[i]] * r->inverse_double[z]);
+        r->shear[i] = -(float)(d[r->axis[i]] * r->inverse_double[z]);
     r->shear[2] = (float)r->inverse_double[z];
     d3_store_floats(r->from_high, from);
-    d3_store_floats(r->from_low, d3_beyond_floats(from));
+    d3_store_floats(r->from_low, d3_mul(d3_beyond_floats(from), d3_all(-r->s->scale)));
 }
 
 /* --- boxes --- */
@@ -137,7 +137,7 @@ EBPO_EIGHT void ray_axis(const ebpo_ray_search *r, const ebpo_face_block *b, int
            scale = f8_all((float)r->s->scale);
         ebpo_face_block_floats(b, axis, corner);
         for (int i = 0; i < 3; i++)
-            corner[i] = f8_mul(f8_sub(f8_sub(corner[i], high), low), scale);
+            corner[i] = f8_mul_add(f8_sub(corner[i], high), scale, low);
         return;
     }
     double x[3][EBPO_BLOCK];
@@ -157,8 +157,8 @@ EBPO_EIGHT projected ray_view(const ebpo_ray_search *r, const ebpo_face_block *b
     ray_axis(r, b, r->axis[0], wide, out.x);
     ray_axis(r, b, r->axis[1], wide, out.y);
     for (int i = 0; i < 3; i++) {
-        out.x[i] = f8_mul_add(out.z[i], f8_all(-r->shear[0]), out.x[i]);
-        out.y[i] = f8_mul_add(out.z[i], f8_all(-r->shear[1]), out.y[i]);
+        out.x[i] = f8_mul_add(out.z[i], f8_all(r->shear[0]), out.x[i]);
+        out.y[i] = f8_mul_add(out.z[i], f8_all(r->shear[1]), out.y[i]);
     }
     return out;
 }
@@ -333,11 +333,11 @@ EBPO_EIGHT uint32_t ray_next(const ebpo_accel *s, ebpo_visit *stack, uint32_t *t
 {
     unsigned rest = lanes & (lanes - 1);
     do {
-        uint32_t child = b->child[__builtin_ctz(rest)];
+        uint32_t child = b->child[(unsigned)__builtin_ctz(rest)];
         stack[(*top)++] = child;
         ray_fetch(s, child, wide);
     } while (rest &= rest - 1);
-    return b->child[__builtin_ctz(lanes)];
+    return b->child[(unsigned)__builtin_ctz(lanes)];
 }
 
 /* Returns one of the children `lanes`, and pushes the others. `sorted`: visits nearer children
@@ -346,7 +346,7 @@ EBPO_EIGHT uint32_t ray_enter(const ebpo_accel *s, ebpo_visit *stack, uint32_t *
                               const ebpo_bound *b, unsigned lanes, f8 enter, bool wide, bool sorted)
 {
     if (!(lanes & (lanes - 1)))
-        return b->child[__builtin_ctz(lanes)];
+        return b->child[(unsigned)__builtin_ctz(lanes)];
     return sorted ? ray_nearest(s, stack, top, b, lanes, enter, wide)
                   : ray_next(s, stack, top, b, lanes, wide);
 }
@@ -405,6 +405,8 @@ static void ray_walk_from(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack)
 static void ray_walk(ebpo_ray_search *r)
 {
     ebpo_visit stack[EBPO_VISITS_MAX];
+    if (r->s->bound_count == 0)
+        return;
     d3 from = d3_load(r->ray->origin), d = d3_load(r->ray->direction),
        origin = d3_mul(d3_sub(from, d3_load(r->s->centre)), d3_all(r->s->scale));
     if (!ray_place(r, from, d, origin)) {

@@ -206,7 +206,7 @@ static bool move_origin(ebpo_ray_search *r, double *greatest)
 static void set_error(ebpo_ray_search *r, double greatest)
 {
     r->error = ebpo_ray_error(r->s, greatest);
-    r->blur = greatest < 0x1p30 ? (float)(r->error * 0x1p23 + 0x1p-30) : INFINITY;
+    r->blur = greatest < 0x1p30 ? ebpo_ray_blur(r->error) : INFINITY;
     if (greatest < 0x1p80)
         return;
     r->error = (double)EBPO_RAY_BEYOND; /* the ray may intersect all boxes */
@@ -454,10 +454,11 @@ static inline void begin_search(casting *c, ebpo_ray_search *r, const ebpo_accel
 }
 
 /* Ends a search after the kernel's walk. */
-static void end_search(ebpo_ray_search *r)
+static inline void end_search(ebpo_ray_search *r)
 {
     casting *c = r->user;
-    judge_waiting(r);
+    if (r->count)
+        judge_waiting(r);
     if (r->any_hit) {
         c->count = 1;
         c->done = true;
@@ -465,11 +466,9 @@ static void end_search(ebpo_ray_search *r)
 }
 
 /* Searches the faces of a subtree or of the whole model. */
-static void cast_subtree(casting *c, const ebpo_accel *s)
+static inline __attribute__((always_inline)) void cast_subtree(casting *c, const ebpo_accel *s)
 {
     ebpo_ray_search r;
-    if (s->bound_count == 0)
-        return;
     begin_search(c, &r, s);
     c->context->model->kernels.ray->walk(&r);
     end_search(&r);
@@ -555,7 +554,7 @@ static ebpo_status cast_node(casting *c, const ebpo_box *box, ebpo_node node, eb
 
 /* Ends the search of a valid ray. In a subset, fails if a pruned node may have another wanted hit.
  */
-static ebpo_status ray_end(casting *c, ebpo_status status, ebpo_error *error)
+static inline ebpo_status ray_end(casting *c, ebpo_status status, ebpo_error *error)
 {
     if (status == EBPO_OK && !c->done && !c->waits && c->context->model->info->pruned)
         status = ebpo_check_pruned(c->context, ray_matters, c, error);
@@ -565,7 +564,7 @@ static ebpo_status ray_end(casting *c, ebpo_status status, ebpo_error *error)
 }
 
 /* Finds the hits of a valid ray. */
-static ebpo_status ray_walk(casting *c, ebpo_error *error)
+static inline ebpo_status ray_walk(casting *c, ebpo_error *error)
 {
     ebpo_status status = EBPO_OK;
     if (c->context->model->whole) {
@@ -584,11 +583,12 @@ static ebpo_status cast_ray(casting *c, ebpo_context *context, const double orig
                             ebpo_error *error)
 {
     casting_begin(c, context, origin, direction, t_max, wants, EBPO_RAY_BOTH);
-    ebpo_status status = ebpo_check_mesh(context->model, error);
     const char *fault = ray_fault(origin, direction, t_max);
     if (fault)
         return ebpo_fail(error, EBPO_E_ARGUMENT, "the ray %s", fault);
-    return status == EBPO_OK ? ray_walk(c, error) : status;
+    if (!(context->model->info->parts & EBPO_PART_MESH))
+        return ebpo_check_mesh(context->model, error);
+    return ray_walk(c, error);
 }
 
 ebpo_status ebpo_ray_first(ebpo_context *context, const double origin[3], const double direction[3],

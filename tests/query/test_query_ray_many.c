@@ -5,6 +5,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef EBPO_COUNTS_INSTRUCTIONS
+#include <signal.h>
+#include <sys/ptrace.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 
 #include "check_main.h"
 #include "query/face_block.h"
@@ -459,6 +465,51 @@ START_TEST(test_kernel_places_ordinary_rays)
 }
 END_TEST
 
+#ifdef EBPO_COUNTS_INSTRUCTIONS
+/* Returns the number of instructions of a child process that finds the first hits of rays. The
+ * child stops after each instruction. Returns 0 if the system does not allow this. */
+static uint64_t count_instructions(ebpo_context *context, const ebpo_ray *rays, int count)
+{
+    uint64_t instructions = 0;
+    int state = 0;
+    ebpo_ray_hit hit;
+    bool any;
+    pid_t child = fork();
+    if (child == 0) {
+        if (ptrace(PTRACE_TRACEME, 0, NULL, NULL) != 0 || raise(SIGSTOP) != 0)
+            _exit(1);
+        for (int i = 0; i < count; i++)
+            if (ebpo_ray_first(context, rays[i].origin, rays[i].direction, rays[i].t_max, &hit,
+                               &any, NULL) != EBPO_OK)
+                _exit(1);
+        _exit(0);
+    }
+    while (waitpid(child, &state, 0) == child && WIFSTOPPED(state) &&
+           ptrace(PTRACE_SINGLESTEP, child, NULL, NULL) == 0)
+        instructions++;
+    return WIFEXITED(state) && WEXITSTATUS(state) == 0 ? instructions : 0;
+}
+
+/* A single ray that misses the model takes few instructions. */
+START_TEST(test_single_rays_take_few_instructions)
+{
+    enum { RAYS = 8, MOST = 455 };
+    ebpo_ray rays[2 * RAYS];
+    query_model m;
+    query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[5]);
+    for (int i = 0; i < 2 * RAYS; i++)
+        rays[i] = (ebpo_ray){ { 0.1, 0.2, -5 },
+                              { (i % 8 - 3.7) * 0x1p-6, (i / 8 % 8 - 3.4) * 0x1p-6, -1 },
+                              INFINITY };
+    /* the first call also loads functions */
+    uint64_t once = count_instructions(m.context, rays, RAYS),
+             twice = count_instructions(m.context, rays, 2 * RAYS);
+    ck_assert_uint_le((twice - once) / RAYS, MOST);
+    query_model_free(&m);
+}
+END_TEST
+#endif
+
 /* A picture of nothing needs one visit of a node for each EBPO_RAY_GROUP rays. */
 START_TEST(test_bundles_miss_together)
 {
@@ -767,6 +818,12 @@ TEST_SUITE(query_ray_many)
     tcase_add_loop_test(many, test_coherent_rays_match_single_rays, 0, query_solid_count());
     tcase_add_loop_test(tight, test_rays_detect_inside_of_convex_solids, 0, 2);
     tcase_add_loop_test(tight, test_rays_detect_inside_of_solids, 0, query_solid_count());
+#ifdef EBPO_COUNTS_INSTRUCTIONS
+    TCase *counts = tcase_create("instructions");
+    tcase_set_timeout(counts, 600);
+    tcase_add_test(counts, test_single_rays_take_few_instructions);
+    suite_add_tcase(suite, counts);
+#endif
     suite_add_tcase(suite, many);
     suite_add_tcase(suite, tight);
     return suite;
