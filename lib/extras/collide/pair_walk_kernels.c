@@ -69,6 +69,7 @@ EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
     turn_vector8(p->into[1 - side], a, a2);
     turn_vector8(p->into[1 - side], mid, mid2);
     out->cylinders = f8_bits(exists) != 0;
+    out->large = b->large;
     f8_store(out->half, f8_pick(exists, f8_sub(to, from), f8_all(0x1p100f)));
     f8_store(out->radius, f8_mul(f8_mul(f8_from_shorts(b->radius), f8_all(b->aside_step)), unit));
     store_vector8(out->axis, a);
@@ -180,8 +181,9 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 
 /* Returns, for each cylinder of P, the greatest gap between P's child and child j of Q along the
  * axes of both cylinders, computed in P's frame. Along the axis of a cylinder, the extent of the
- * other child is bounded by its cylinder and by its box. */
-EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
+ * other child is bounded by its cylinder and by its box. Raises *key_gap to the gaps without the
+ * cylinders of large children. */
+EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j, f8 *key_gap)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
     /* between_mids, to_q_box, to_p_box: vectors between the middles of both cylinders, between P's
@@ -206,7 +208,7 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
     f8 by_cylinder = f8_sub(f8_abs(vector_dot8(p_axis, between_mids)),
                             f8_add(f8_mul(cosine, q_half), f8_mul(sine, q_radius))),
        by_box = f8_sub(f8_abs(vector_dot8(p_axis, to_q_box)), vector_dot8(p_size, e));
-    f8 gap = f8_sub(f8_max(by_cylinder, by_box), p_half);
+    f8 gap = f8_sub(f8_max(by_cylinder, by_box), p_half), box_gap = f8_sub(by_box, p_half);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         e[k] = f8_load(p->e[k]);
@@ -215,7 +217,15 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
     by_cylinder = f8_sub(f8_abs(vector_dot8(q_axis, between_mids)),
                          f8_add(f8_mul(cosine, p_half), f8_mul(sine, p_radius)));
     by_box = f8_sub(f8_abs(vector_dot8(q_axis, to_p_box)), vector_dot8(p_axis, e));
-    return f8_max(gap, f8_sub(f8_max(by_cylinder, by_box), q_half));
+    f8 q_gap = f8_sub(f8_max(by_cylinder, by_box), q_half), both = f8_max(gap, q_gap), key = both;
+    if (p->large | q->large) {
+        f8 none = f8_all(-0x1p120f), large = f8_mask(p->large);
+        key = q->large >> j & 1 ? f8_pick(large, none, box_gap)
+                                : f8_max(f8_pick(large, none, gap),
+                                         f8_pick(large, f8_sub(by_box, q_half), q_gap));
+    }
+    *key_gap = f8_max(*key_gap, key);
+    return both;
 }
 
 /* Returns a bit for each child of P, 1 if the child may intersect child j of Q (or if the computed
@@ -226,9 +236,8 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
     f8 gap = box_gaps(t, j);
     unsigned near = t->p->lanes & ~f8_bits(f8_less(t->slack, gap));
     if (near && t->cylinders) {
-        f8 cylinder = cylinder_gaps(t, j);
+        f8 cylinder = cylinder_gaps(t, j, &gap);
         near &= ~f8_bits(f8_less(t->cylinder_slack, cylinder));
-        gap = f8_max(gap, cylinder);
     }
     if (first && near) {
         f8 sizes = f8_add(f8_load(t->p->extent), f8_all(t->q->extent[j]));
