@@ -94,7 +94,8 @@ static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, eb
         f8 x = f8_all(row[0]), y = f8_all(row[1]), z = f8_all(row[2]);
         f8_store(out->c2[i], f8_add(f8_add(f8_mul(x, c[0]), f8_mul(y, c[1])), f8_mul(z, c[2])));
         f8_store(out->axis2[i], f8_add(f8_add(f8_mul(x, a[0]), f8_mul(y, a[1])), f8_mul(z, a[2])));
-        f8_store(out->mid2[i], f8_add(f8_add(f8_mul(x, mid[0]), f8_mul(y, mid[1])), f8_mul(z, mid[2])));
+        f8_store(out->mid2[i],
+                 f8_add(f8_add(f8_mul(x, mid[0]), f8_mul(y, mid[1])), f8_mul(z, mid[2])));
     }
     for (int k = 0; k < 3; k++)
         e[k] = f8_load(out->e[k]);
