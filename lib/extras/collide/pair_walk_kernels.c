@@ -300,6 +300,10 @@ EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
     const ebpo_accel *a = w->pair->accel[0], *b = w->pair->accel[1];
     uint32_t node_a = p->node, node_b = q->node;
     two_nodes t = two_nodes_of(w->pair, p, q, 0);
+    /* The cylinders of the roots' children exclude few pairs. Cylinders that are not large are
+     * needed for keys. */
+    if (node_a == a->root_bound && node_b == b->root_bound)
+        t.cylinders &= p->large != p->lanes || q->large != q->lanes;
     float key[64];
     uint64_t near = 0;
     bool same_node = w->self && node_a == node_b;
