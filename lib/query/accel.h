@@ -219,8 +219,12 @@ typedef struct ebpo_bound_cylinder {
     _Alignas(64) int16_t axis[3][8];
     int16_t from[8], to[8], radius[8];
     float along_step, aside_step;
-    uint8_t spare[24];
+    uint8_t large; /* a bit for each child with more than EBPO_LARGE_CHILD blocks */
+    uint8_t spare[23];
 } ebpo_bound_cylinder;
+/* The cylinders of larger children exclude pairs of nodes, but they do not change the order in
+ * which pairs are visited (collide/pair_walk_kernels.c). */
+enum { EBPO_LARGE_CHILD = 1024 };
 
 /* A child's bounding cylinder, decoded. */
 typedef struct ebpo_child_cylinder {

@@ -22,9 +22,6 @@
 #include "query/accel_parts.h"
 #include "query/query_kernels.h"
 
-/* Maximum number of blocks in a bounding cylinder: the faces of more blocks are usually too curved
- * for a thin cylinder. */
-enum { CYLINDER_BLOCKS_MAX = 1024 };
 /* Enlargement of boxes, relative to the largest coordinate of their faces. */
 static const double box_slack = 0x1p-19;
 /* Enlargement of bounding cylinders, relative to the node's size. (Not relative to the largest
@@ -339,39 +336,24 @@ static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder 
     out->radius2 = aside * aside;
 }
 
-/* Sets a cylinder without an axis: a ball around the box, which excludes no point of the box. half:
- * half of the sides of the box. */
-static void set_no_cylinder(ebpo_bound_cylinder *b, int lane, const double half[3], cylinder *out)
-{
-    for (int k = 0; k < 3; k++) {
-        b->axis[k][lane] = 0;
-        out->radius2 += half[k] * half[k];
-    }
-}
-
-/* Returns the bounding cylinder of a child of node n, and stores its axis. `e`: extent of the
- * child.
- */
+/* Returns the bounding cylinder of a child of node n; stores its axis, and if it is large. `e`:
+ * extent of the child. */
 static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const extent *e)
 {
     const ebpo_bound *b = &j->s->bound[n];
+    ebpo_bound_cylinder *cylinders = &j->s->cylinder[n];
     cylinder out = { { 0, 0, 0 }, { 0, 0, 0 }, 0, 0, 0 };
-    double half[3];
     for (int k = 0; k < 3; k++) {
         ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
         out.middle[k] = (side.low + side.high) / 2;
-        half[k] = (side.high - side.low) / 2;
     }
     uint32_t child = j->layout->child[n][lane], first = child & ~EBPO_IS_BLOCK, last = first + 1;
     if (!(child & EBPO_IS_BLOCK)) {
         first = j->layout->first_block[child];
         last = j->layout->last_block[child];
     }
-    if (last - first > CYLINDER_BLOCKS_MAX) {
-        set_no_cylinder(&j->s->cylinder[n], lane, half, &out);
-        return out;
-    }
-    choose_axis(e, &j->s->cylinder[n], lane, &out);
+    cylinders->large |= (uint8_t)((last - first > EBPO_LARGE_CHILD) << lane);
+    choose_axis(e, cylinders, lane, &out);
     if (j->s->wide)
         enclose_wide(j, first, last, &out);
     else

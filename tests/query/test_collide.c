@@ -13,18 +13,25 @@
 #include "geometry/triangle_pair.h"
 #include "query_support.h"
 
-/* Kernels that count how many sides of boxes they decode for eight children at a time. */
-static uint64_t decoded_sides;
+/* Kernels that count how many sides of boxes they decode for eight children at a time, and how many
+ * times they compute eight square roots. */
+static uint64_t decoded_sides, square_roots;
 EBPO_EIGHT f8 decode_sides(const uint8_t *x)
 {
     decoded_sides++;
     return f8_from_bytes(x);
 }
+EBPO_EIGHT f8 count_roots(f8 x)
+{
+    square_roots++;
+    return f8_sqrt(x);
+}
 #define f8_from_bytes      decode_sides
+#define f8_sqrt            count_roots
 #define EBPO_KERNEL_SUFFIX counted
 #include "extras/collide/pair_walk_kernels.c"
 
-enum { POSES = 12 };
+enum { POSES = 12, LARGE_POSES = 40 };
 
 /* --- poses --- */
 
@@ -594,6 +601,19 @@ START_TEST(test_collide_bad_pose_and_cancel)
 }
 END_TEST
 
+/* Begins a walk of the collider with the counting kernels. */
+static void begin_counted_walk(ebpo_collider *c, const ebpo_collide_options *options,
+                               ebpo_collision *q, ebpo_accel_pair *pair)
+{
+    ASSERT_OK(ebpo_collision_begin(q, c, options, error));
+    const ebpo_accel *accel[2] = { q->model[0]->whole, q->model[1]->whole };
+    const ebpo_block_posing *posing[2] = { &q->posing[0], &q->posing[1] };
+    ebpo_accel_pair_make(pair, accel, posing, q->max_coordinate);
+    ebpo_pair_walk_begin(&c->walk, pair);
+    c->walk.kernels = &ebpo_walk_kernels_counted;
+    decoded_sides = square_roots = 0;
+}
+
 START_TEST(test_collide_keeps_transformed_nodes)
 {
     query_model m;
@@ -604,18 +624,84 @@ START_TEST(test_collide_keeps_transformed_nodes)
     query_model_make(&m, "sphere", query_solid_by_name("sphere"), &query_variants[0]);
     ASSERT_OK(ebpo_collider_new(m.model, m.model, NULL, &c, error));
     options.pose_b.translation[0] = m.size / 2;
-    ASSERT_OK(ebpo_collision_begin(&q, c, &options, error));
-    const ebpo_accel *accel[2] = { q.model[0]->whole, q.model[1]->whole };
-    const ebpo_block_posing *posing[2] = { &q.posing[0], &q.posing[1] };
-    ebpo_accel_pair_make(&pair, accel, posing, q.max_coordinate);
-    ebpo_pair_walk_begin(&c->walk, &pair);
-    c->walk.kernels = &ebpo_walk_kernels_counted;
-    decoded_sides = 0;
+    begin_counted_walk(c, &options, &q, &pair);
     ck_assert(c->walk.kernels->start(&c->walk) && c->walk.kernels->run(&c->walk, UINT64_MAX));
     uint64_t transformed = decoded_sides / 6; /* two sides on each axis */
     ck_assert_uint_eq(c->walk.node_pairs, 126);
     ck_assert_uint_le(transformed, 60); /* 106 with half of EBPO_TURNED_NODES */
     ebpo_collider_free(c);
+    query_model_free(&m);
+}
+END_TEST
+
+/* Finds the first contact at each pose. Returns the number of visited pairs of nodes. */
+static uint64_t first_contacts(const query_model *m, const ebpo_pose *pose, int32_t *found,
+                               ebpo_face_pair *pair)
+{
+    ebpo_collider *c;
+    ebpo_collide_options options = EBPO_COLLIDE_OPTIONS_INIT;
+    ebpo_collider_stats stats = EBPO_COLLIDER_STATS_INIT;
+    ASSERT_OK(ebpo_collider_new(m->model, m->model, NULL, &c, error));
+    for (int i = 0; i < LARGE_POSES; i++) {
+        options.pose_b = pose[i];
+        ASSERT_OK(ebpo_collide_first(c, &options, &pair[i], &found[i], error));
+    }
+    ck_assert_int_eq(ebpo_collider_get_stats(c, &stats), EBPO_OK);
+    ebpo_collision q;
+    ebpo_accel_pair walked;
+    begin_counted_walk(c, &options, &q, &walked);
+    ck_assert(c->walk.kernels->start(&c->walk));
+    ck_assert_uint_eq(square_roots, 2); /* each root was transformed; no cylinders were compared */
+    ebpo_collider_free(c);
+    return stats.node_pairs;
+}
+
+/* Removes the bounding cylinders of large children. A child without a cylinder has a radius that is
+ * not less than half the diagonal of its box. */
+static void remove_large_cylinders(const ebpo_accel *s)
+{
+    for (uint32_t n = 0; n < s->bound_count; n++) {
+        ebpo_bound_cylinder *b = &s->cylinder[n];
+        b->aside_step *= b->large ? 2 : 1;
+        for (int lane = 0; lane < 8; lane++) {
+            if (!(b->large >> lane & 1))
+                continue;
+            for (int k = 0; k < 3; k++)
+                b->axis[k][lane] = 0;
+            b->from[lane] = b->to[lane] = 0;
+            b->radius[lane] = INT16_MAX;
+        }
+    }
+}
+
+/* The bounding cylinders of large children exclude pairs of nodes, but they do not change the first
+ * contact. */
+START_TEST(test_collide_large_cylinders_exclude_pairs)
+{
+    query_model m;
+    ebpo_pose pose[LARGE_POSES];
+    int32_t found[2][LARGE_POSES], contacts = 0;
+    ebpo_face_pair pair[2][LARGE_POSES];
+    uint64_t state = 7;
+    query_model_make(&m, "large sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 7),
+                     &query_variants[0]);
+    for (int i = 0; i < LARGE_POSES; i++) { /* the middles have distances of 1.7 to 2.2 */
+        pose[i] = make_pose(6, 1, &state);
+        double *t = pose[i].translation, length = sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+        for (int k = 0; k < 3; k++)
+            t[k] *= (1.7 + 0.5 * i / LARGE_POSES) / length;
+    }
+    uint64_t with = first_contacts(&m, pose, found[0], pair[0]);
+    remove_large_cylinders(m.model->whole);
+    uint64_t without = first_contacts(&m, pose, found[1], pair[1]);
+    ck_assert_uint_lt(5 * with, 4 * without); /* 511, 703 */
+    for (int i = 0; i < LARGE_POSES; i++) {
+        ck_assert_int_eq(found[0][i], found[1][i]);
+        ck_assert_mem_eq(&pair[0][i], &pair[1][i], sizeof pair[0][i]);
+        contacts += found[0][i];
+    }
+    ck_assert_int_gt(contacts, LARGE_POSES / 4);
+    ck_assert_int_lt(contacts, LARGE_POSES);
     query_model_free(&m);
 }
 END_TEST
@@ -634,6 +720,7 @@ TEST_SUITE(collide)
     tcase_add_test(tests, test_collide_levels_bound_result);
     tcase_add_test(tests, test_collide_bad_pose_and_cancel);
     tcase_add_test(tests, test_collide_keeps_transformed_nodes);
+    tcase_add_test(nested, test_collide_large_cylinders_exclude_pairs);
     Suite *suite = suite_create("collide");
     suite_add_tcase(suite, tests);
     suite_add_tcase(suite, threads);

@@ -41,6 +41,7 @@ typedef struct ebpo_turned_node {
     float size;                          /* length of the longest side of all boxes */
     uint32_t node;                       /* the node's index */
     uint8_t lanes;                       /* a bit for each lane that has a child */
+    uint8_t large;                       /* ebpo_bound_cylinder.large, if `cylinders` */
     bool cylinders;                      /* at least one child has a cylinder */
 } ebpo_turned_node;
 

@@ -30,12 +30,11 @@ EBPO_EIGHT void store_vector8(float out[3][8], const f8 x[3])
         f8_store(out[k], x[k]);
 }
 
-/* Decodes the children's boxes, and computes boxes around these boxes in the other frame. Sets c to
- * the middles of the decoded boxes. */
-EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound *b,
-                                ebpo_turned_node *out, f8 c[3])
+/* Decodes the children's boxes. */
+EBPO_EIGHT void decode_boxes(const ebpo_accel_pair *p, int side, const ebpo_bound *b,
+                             ebpo_turned_node *out, f8 c[3])
 {
-    f8 e[3], c2[3], e2[3];
+    f8 e[3];
     float longest = 0;
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
@@ -43,38 +42,31 @@ EBPO_EIGHT void transform_boxes(const ebpo_accel_pair *p, int side, const ebpo_b
         decode_boxes8(b, k, p->unit[side], &c[k], &e[k]);
         longest = step > longest ? step : longest;
     }
-    turn_vector8(p->into[1 - side], c, c2);
-    turn_vector8(p->size[1 - side], e, e2);
     out->size = 255 * longest; /* sides of boxes are coded as 0 to 255 steps */
     store_vector8(out->c, c);
     store_vector8(out->e, e);
     f8_store(out->extent, f8_add(f8_add(e[0], e[1]), e[2]));
-    store_vector8(out->c2, c2);
-    store_vector8(out->e2, e2);
 }
 
-/* Decodes and rotates the children's bounding cylinders. A child without a cylinder gets a cylinder
- * of extreme length, which excludes no pair. c: middles of the boxes. a, inverse, exists: from
- * decode_axes8. */
-EBPO_EIGHT void transform_cylinders(const ebpo_accel_pair *p, int side,
-                                    const ebpo_bound_cylinder *b, ebpo_turned_node *out,
-                                    const f8 c[3], const f8 a[3], f8 inverse, f8 exists)
+/* Decodes the children's bounding cylinders. A child without a cylinder gets a cylinder of extreme
+ * length, which excludes no pair. c: middles of the boxes. a, inverse, exists: from decode_axes8.
+ * Sets mid to the middles of the cylinders. */
+EBPO_EIGHT void decode_cylinders(const ebpo_accel_pair *p, int side, const ebpo_bound_cylinder *b,
+                                 ebpo_turned_node *out, const f8 c[3], const f8 a[3], f8 inverse,
+                                 f8 exists, f8 mid[3])
 {
-    f8 a2[3], mid[3], mid2[3], unit = f8_all(p->unit[side]);
+    f8 unit = f8_all(p->unit[side]);
     f8 along = f8_mul(f8_mul(inverse, unit), f8_all(0.5f * b->along_step)),
        from = f8_mul(f8_from_shorts(b->from), along), to = f8_mul(f8_from_shorts(b->to), along);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++)
         mid[k] = f8_add(c[k], f8_mul(a[k], f8_add(from, to)));
-    turn_vector8(p->into[1 - side], a, a2);
-    turn_vector8(p->into[1 - side], mid, mid2);
-    out->cylinders = f8_bits(exists) != 0;
+    out->cylinders = p->cylinders && f8_bits(exists) != 0;
+    out->large = b->large;
     f8_store(out->half, f8_pick(exists, f8_sub(to, from), f8_all(0x1p100f)));
     f8_store(out->radius, f8_mul(f8_mul(f8_from_shorts(b->radius), f8_all(b->aside_step)), unit));
     store_vector8(out->axis, a);
     store_vector8(out->mid, mid);
-    store_vector8(out->axis2, a2);
-    store_vector8(out->mid2, mid2);
 }
 
 /* Returns four doubles. */
@@ -91,11 +83,25 @@ static void transform_node(const ebpo_accel_pair *p, int side, uint32_t node, eb
 {
     const ebpo_bound *b = &p->accel[side]->bound[node];
     const ebpo_bound_cylinder *cylinders = &p->accel[side]->cylinder[node];
-    f8 c[3], a[3], inverse, exists;
+    f8 c[3], a[3], mid[3], e[3], inverse, exists;
     decode_axes8(cylinders, a, &inverse, &exists);
-    transform_boxes(p, side, b, out, c);
-    transform_cylinders(p, side, cylinders, out, c, a, inverse, exists);
-    out->cylinders = out->cylinders && p->cylinders;
+    decode_boxes(p, side, b, out, c);
+    decode_cylinders(p, side, cylinders, out, c, a, inverse, exists, mid);
+    /* all vectors by one row of the matrix, because a row fits in the registers */
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++) {
+        const float *row = p->into[1 - side][i];
+        f8 x = f8_all(row[0]), y = f8_all(row[1]), z = f8_all(row[2]);
+        f8_store(out->c2[i], f8_add(f8_add(f8_mul(x, c[0]), f8_mul(y, c[1])), f8_mul(z, c[2])));
+        f8_store(out->axis2[i], f8_add(f8_add(f8_mul(x, a[0]), f8_mul(y, a[1])), f8_mul(z, a[2])));
+        f8_store(out->mid2[i],
+                 f8_add(f8_add(f8_mul(x, mid[0]), f8_mul(y, mid[1])), f8_mul(z, mid[2])));
+    }
+    for (int k = 0; k < 3; k++)
+        e[k] = f8_load(out->e[k]);
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; i++)
+        f8_store(out->e2[i], turned_row8(p->size[1 - side][i], e));
     double unit = (double)p->unit[side], x = (double)b->origin[0] * unit,
            y = (double)b->origin[1] * unit, z = (double)b->origin[2] * unit;
     v4d origin = { x, y, z, 0 };
@@ -180,8 +186,9 @@ EBPO_EIGHT f8 box_gaps(const two_nodes *t, int j)
 
 /* Returns, for each cylinder of P, the greatest gap between P's child and child j of Q along the
  * axes of both cylinders, computed in P's frame. Along the axis of a cylinder, the extent of the
- * other child is bounded by its cylinder and by its box. */
-EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
+ * other child is bounded by its cylinder and by its box. Raises *key_gap to the gaps without the
+ * cylinders of large children. */
+EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j, f8 *key_gap)
 {
     const ebpo_turned_node *p = t->p, *q = t->q;
     /* between_mids, to_q_box, to_p_box: vectors between the middles of both cylinders, between P's
@@ -206,7 +213,7 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
     f8 by_cylinder = f8_sub(f8_abs(vector_dot8(p_axis, between_mids)),
                             f8_add(f8_mul(cosine, q_half), f8_mul(sine, q_radius))),
        by_box = f8_sub(f8_abs(vector_dot8(p_axis, to_q_box)), vector_dot8(p_size, e));
-    f8 gap = f8_sub(f8_max(by_cylinder, by_box), p_half);
+    f8 gap = f8_sub(f8_max(by_cylinder, by_box), p_half), box_gap = f8_sub(by_box, p_half);
 #pragma GCC unroll 3
     for (int k = 0; k < 3; k++) {
         e[k] = f8_load(p->e[k]);
@@ -215,7 +222,15 @@ EBPO_EIGHT f8 cylinder_gaps(const two_nodes *t, int j)
     by_cylinder = f8_sub(f8_abs(vector_dot8(q_axis, between_mids)),
                          f8_add(f8_mul(cosine, p_half), f8_mul(sine, p_radius)));
     by_box = f8_sub(f8_abs(vector_dot8(q_axis, to_p_box)), vector_dot8(p_axis, e));
-    return f8_max(gap, f8_sub(f8_max(by_cylinder, by_box), q_half));
+    f8 q_gap = f8_sub(f8_max(by_cylinder, by_box), q_half), both = f8_max(gap, q_gap), key = both;
+    if (p->large | q->large) {
+        f8 none = f8_all(-0x1p120f), large = f8_mask(p->large);
+        key = q->large >> j & 1 ? f8_pick(large, none, box_gap)
+                                : f8_max(f8_pick(large, none, gap),
+                                         f8_pick(large, f8_sub(by_box, q_half), q_gap));
+    }
+    *key_gap = f8_max(*key_gap, key);
+    return both;
 }
 
 /* Returns a bit for each child of P, 1 if the child may intersect child j of Q (or if the computed
@@ -226,9 +241,8 @@ EBPO_EIGHT unsigned near_children_of(const two_nodes *t, int j, bool first, floa
     f8 gap = box_gaps(t, j);
     unsigned near = t->p->lanes & ~f8_bits(f8_less(t->slack, gap));
     if (near && t->cylinders) {
-        f8 cylinder = cylinder_gaps(t, j);
+        f8 cylinder = cylinder_gaps(t, j, &gap);
         near &= ~f8_bits(f8_less(t->cylinder_slack, cylinder));
-        gap = f8_max(gap, cylinder);
     }
     if (first && near) {
         f8 sizes = f8_add(f8_load(t->p->extent), f8_all(t->q->extent[j]));
@@ -286,6 +300,10 @@ EBPO_EIGHT void push_both(ebpo_pair_walk *w, const ebpo_turned_node *p, const eb
     const ebpo_accel *a = w->pair->accel[0], *b = w->pair->accel[1];
     uint32_t node_a = p->node, node_b = q->node;
     two_nodes t = two_nodes_of(w->pair, p, q, 0);
+    /* The cylinders of the roots' children exclude few pairs. Cylinders that are not large are
+     * needed for keys. */
+    if (node_a == a->root_bound && node_b == b->root_bound)
+        t.cylinders &= p->large != p->lanes || q->large != q->lanes;
     float key[64];
     uint64_t near = 0;
     bool same_node = w->self && node_a == node_b;
