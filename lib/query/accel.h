@@ -240,19 +240,27 @@ static inline ebpo_child_cylinder ebpo_bound_cylinder_of(const ebpo_bound_cylind
                                   aside * b->radius[lane] };
 }
 
+/* How much of a subtree an accel has. Each value includes the values before it. */
+typedef enum ebpo_accel_content {
+    EBPO_ACCEL_FACES = 0, /* the faces in blocks, and the hierarchy over blocks */
+    EBPO_ACCEL_NODES = 1, /* the child tables, and the leaves with their lists */
+    EBPO_ACCEL_PLANES = 2 /* the plane codes of gray nodes */
+} ebpo_accel_content;
+
 typedef struct ebpo_accel {
-    ebpo_node root;                /* root of the subtree */
-    ebpo_box box;                  /* box of the whole model */
-    int deepest;                   /* level of the tree's deepest nodes */
-    bool has_windings, has_planes; /* has_windings: a solid, or a surface with its border */
-    uint8_t rule;                  /* ebpo_rule */
-    ebpo_node_table nodes;         /* child tables */
-    ebpo_accel_leaf *leaf;         /* [leaf_count] */
+    ebpo_node root;        /* root of the subtree */
+    ebpo_box box;          /* box of the whole model */
+    int deepest;           /* level of the tree's deepest nodes */
+    uint8_t content;       /* ebpo_accel_content */
+    bool has_windings;     /* a solid, or a surface with its border */
+    uint8_t rule;          /* ebpo_rule */
+    ebpo_node_table nodes; /* child tables */
+    ebpo_accel_leaf *leaf; /* [leaf_count] */
     uint32_t leaf_count;
     ebpo_listed_block *list; /* [list_count] the lists of all leaves */
     uint64_t list_count;
     uint32_t list_longest;  /* number of blocks in the longest list */
-    ebpo_leaf_kinds *kinds; /* NULL if !has_windings */
+    ebpo_leaf_kinds *kinds; /* NULL if !has_windings, or without nodes */
     bool wide;              /* true: blocks hold doubles; false: floats */
     char *meshlets;         /* [units][EBPO_MESHLET_UNIT]: records of all blocks (ebpo_meshlet) */
     uint64_t units;
@@ -276,8 +284,8 @@ typedef struct ebpo_accel {
     /* [face_count] in a whole model, index of each face in the source, the mesh that was converted;
      * NULL: a subtree, or the file has no source indices */
     uint32_t *face_source;
-    /* Plane codes of gray nodes; NULL: has_planes is false. The gray node whose children are group
-     * g has the codes gray_planes[gray_first[g] .. gray_first[g + 1] - 1]. */
+    /* Plane codes of gray nodes (EBPO_ACCEL_PLANES); otherwise NULL. The gray node whose children
+     * are group g has the codes gray_planes[gray_first[g] .. gray_first[g + 1] - 1]. */
     uint32_t *gray_planes;
     uint32_t *gray_first; /* [gray_count + 1] */
     uint64_t gray_count;
@@ -302,16 +310,16 @@ bool ebpo_leaf_query(const ebpo_accel *subtree, ebpo_accel_leaf *leaf, ebpo_cell
                      ebpo_cell_faces_fn *cell_faces);
 
 /* Makes an accel from a slice (a subtree with its faces as read from the file), and frees the
- * slice, also after a failure. `with_planes`: keeps gray nodes' planes. `threads` 0: all cores. */
+ * slice, also after a failure. `threads` 0: all cores. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice,
-                                          const ebpo_info *info, bool with_planes, unsigned threads,
-                                          ebpo_error *error);
+                                          const ebpo_info *info, ebpo_accel_content content,
+                                          unsigned threads, ebpo_error *error);
 /* Does the same as ebpo_accel_make, but returns EBPO_E_LIMIT if the memory, including the slice,
  * would exceed the quota (NULL: no limit). For ordinary subtrees and models, the counts show this
  * before memory is taken. */
 EBPO_MUST_USE ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice,
                                                  const ebpo_info *info, ebpo_quota *space,
-                                                 bool with_planes, unsigned threads,
+                                                 ebpo_accel_content content, unsigned threads,
                                                  ebpo_error *error);
 void ebpo_accel_free(ebpo_accel *subtree);
 

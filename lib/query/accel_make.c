@@ -128,13 +128,13 @@ static counts counts_of_all(const ebpo_info *info)
     return c;
 }
 
-static counts counts_of_slice(const ebpo_slice *slice, bool with_planes)
+static counts counts_of_slice(const ebpo_slice *slice, ebpo_accel_content content)
 {
     counts c = { .faces = slice->mesh.face_count,
                  .shared = slice->shared_count,
                  .vertices = slice->mesh.vertex_count,
                  .is_subtree = slice->root.cell.level > 0,
-                 .keeps_planes = with_planes };
+                 .keeps_planes = content >= EBPO_ACCEL_PLANES };
     for (int i = 0; i < slice->level_count; i++) {
         const ebpo_level *level = &slice->level[i];
         c.groups += level->group_count;
@@ -288,7 +288,7 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
     if (!space)
         return EBPO_OK;
     const ebpo_layout *layout = plan->layout;
-    counts c = counts_of_slice(plan->slice, plan->with_planes);
+    counts c = counts_of_slice(plan->slice, plan->content);
     sizes size = sizes_of(&c, plan->info);
     size.only_read = 0; /* the slice has been read */
     block_sizes count = layout ? (block_sizes){ layout->block_count, layout->bound_count, units }
@@ -586,7 +586,7 @@ static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info
                                ebpo_quota *space, unsigned threads, ebpo_error *error)
 {
     ebpo_layout layout;
-    ebpo_accel_plan plan = { info, slice, s->has_planes, NULL };
+    ebpo_accel_plan plan = { info, slice, s->content, NULL };
     ebpo_status status = accel_fits(space, &plan, 0, error);
     if (status == EBPO_OK)
         status = ebpo_layout_make(&layout, slice, EBPO_BLOCKS_MAX, error);
@@ -603,14 +603,14 @@ static ebpo_status make_stages(ebpo_accel *s, ebpo_slice *slice, const ebpo_info
     ebpo_mesh_free(&slice->mesh);
     if (status == EBPO_OK)
         status = ebpo_accel_fill_bounds(s, &layout, threads, error);
-    if (status == EBPO_OK)
+    if (status == EBPO_OK && s->content >= EBPO_ACCEL_NODES)
         status = accel_fill_nodes(s, slice, &layout, error);
     ebpo_layout_free(&layout);
-    if (status == EBPO_OK && s->has_windings) {
+    if (status == EBPO_OK && s->has_windings && s->content >= EBPO_ACCEL_NODES) {
         s->kinds = ebpo_leaf_kinds_make(rows_max(s));
         status = s->kinds ? EBPO_OK : ebpo_fail_memory(error, sizeof *s->kinds);
     }
-    if (status == EBPO_OK && s->has_planes)
+    if (status == EBPO_OK && s->content >= EBPO_ACCEL_PLANES)
         status = copy_planes(s, slice, error);
     return status;
 }
@@ -662,13 +662,13 @@ static void join_arrays(ebpo_accel *s, const ebpo_quota *space)
 }
 
 ebpo_status ebpo_accel_make(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
-                            bool with_planes, unsigned threads, ebpo_error *error)
+                            ebpo_accel_content content, unsigned threads, ebpo_error *error)
 {
-    return ebpo_accel_make_within(out, slice, info, NULL, with_planes, threads, error);
+    return ebpo_accel_make_within(out, slice, info, NULL, content, threads, error);
 }
 
 ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const ebpo_info *info,
-                                   ebpo_quota *space, bool with_planes, unsigned threads,
+                                   ebpo_quota *space, ebpo_accel_content content, unsigned threads,
                                    ebpo_error *error)
 {
     *out = NULL;
@@ -682,7 +682,7 @@ ebpo_status ebpo_accel_make_within(ebpo_accel **out, ebpo_slice *slice, const eb
     s->deepest = slice->root.cell.level + slice->level_count - 1;
     s->has_windings = has_windings(info);
     s->rule = (uint8_t)info->rule;
-    s->has_planes = with_planes;
+    s->content = (uint8_t)content;
     s->wide = accel_needs_doubles(info);
     s->face_count = (uint32_t)slice->mesh.face_count;
     s->shared_count = slice->shared_count;

@@ -40,7 +40,7 @@ void ebpo_layout_free(ebpo_layout *layout);
 typedef struct ebpo_accel_plan {
     const ebpo_info *info;
     const ebpo_slice *slice;
-    bool with_planes;    /* keep the plane codes of gray nodes */
+    ebpo_accel_content content;
     ebpo_layout *layout; /* NULL: not made yet */
 } ebpo_accel_plan;
 

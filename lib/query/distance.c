@@ -462,8 +462,9 @@ ebpo_status ebpo_distance_many(ebpo_context *context, const double *points, uint
         status = ebpo_check_mesh(context->model, error);
     /* Planes improve the bounds of nodes, which matter with a level, with a deadline and, in a
      * subset, for omitted parts. */
-    context->planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
-                      context->model->info->pruned;
+    bool planes = o->level >= 0 || o->deadline_ns || o->mode != EBPO_DISTANCE_EXACT ||
+                  context->model->info->pruned;
+    context->content = planes ? EBPO_ACCEL_PLANES : EBPO_ACCEL_NODES;
     ebpo_batch batch = { .context = context,
                          .points = points,
                          .count = count,

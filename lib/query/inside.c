@@ -923,9 +923,10 @@ static ebpo_status leaf_from_file(inside_query *query, const ebpo_node *leaf,
     ebpo_accel *subtree = NULL;
     ebpo_status status = ebpo_model_has_capacity(m, leaf, error);
     if (status == EBPO_OK)
-        status = ebpo_slice_read_parts(&slice, m->chunks, leaf, ebpo_subtree_needs(false), error);
+        status = ebpo_slice_read_parts(&slice, m->chunks, leaf,
+                                       ebpo_subtree_needs(EBPO_ACCEL_NODES), error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make(&subtree, &slice, m->info, false, 1, error);
+        status = ebpo_accel_make(&subtree, &slice, m->info, EBPO_ACCEL_NODES, 1, error);
     if (status == EBPO_OK && m->holes)
         status =
             ebpo_holes_mark(m->holes,
@@ -1176,9 +1177,10 @@ ebpo_status ebpo_inside_many(ebpo_context *context, const double *points, uint64
     if (status == EBPO_OK && m->whole && o->level < 0 && !o->deadline_ns &&
         o->envelopes != EBPO_ENVELOPES_USE)
         return inside_whole(context, points, count, o->done, out, error);
-    context->planes =
+    bool planes =
         envelopes_hold(context) &&
         (o->level >= 0 || o->deadline_ns || o->envelopes == EBPO_ENVELOPES_USE || m->info->pruned);
+    context->content = planes ? EBPO_ACCEL_PLANES : EBPO_ACCEL_NODES;
     ebpo_batch batch = { .context = context,
                          .points = points,
                          .count = count,

@@ -117,7 +117,7 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
         if (!ebpo_cache_has(m->cache, ebpo_context_key(c, below[i])))
             needed[absent++] = below[i];
     ebpo_top_hint(m->top, m->chunks, needed, absent,
-                  ebpo_subtree_needs(c->planes) | EBPO_NEEDS_MAPS); /* MAPS: for results */
+                  ebpo_subtree_needs(c->content) | EBPO_NEEDS_MAPS); /* MAPS: for results */
     free(needed);
 }
 

@@ -173,7 +173,7 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
 {
     ebpo_model *m = user;
     ebpo_slice_size size;
-    uint32_t below = (uint32_t)(key >> 1), needs = ebpo_subtree_needs(key & 1);
+    uint32_t below = ebpo_subtree_of_key(key), needs = ebpo_subtree_needs(ebpo_content_of_key(key));
     const ebpo_node *root = &m->top->below[below];
     bool is_of_file = root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level;
     if (!is_of_file)
@@ -246,18 +246,20 @@ static ebpo_status load_subtree(void *user, uint64_t key, uint64_t quota, void *
                                 uint64_t *bytes, ebpo_error *error)
 {
     ebpo_model *m = user;
+    uint32_t below = ebpo_subtree_of_key(key);
+    ebpo_accel_content content = ebpo_content_of_key(key);
     ebpo_quota space = { .most = quota };
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
-    ebpo_status status = ebpo_slice_read_within(&slice, m->chunks, &m->top->below[key >> 1],
-                                                ebpo_subtree_needs(key & 1), &space, error);
+    ebpo_status status = ebpo_slice_read_within(&slice, m->chunks, &m->top->below[below],
+                                                ebpo_subtree_needs(content), &space, error);
     if (status == EBPO_OK)
-        status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, key & 1, 1, error);
-    if (status == EBPO_OK)
+        status = ebpo_accel_make_within(&subtree, &slice, m->info, &space, content, 1, error);
+    if (status == EBPO_OK && content >= EBPO_ACCEL_NODES)
         status = mark_accel(m, subtree, space_for_marks(m, subtree, quota), error);
     if (status == EBPO_OK) {
         ebpo_model_count_leaves(m, subtree, 1);
-        ebpo_skeletons_keep(m->skeletons, key >> 1, subtree);
+        ebpo_skeletons_keep(m->skeletons, below, subtree);
     } else {
         ebpo_accel_free(subtree);
         subtree = NULL;
@@ -303,7 +305,7 @@ static ebpo_status open_whole(ebpo_model *m, ebpo_error *error)
     ebpo_status status = ebpo_slice_read_all(&slice, m->file, m->options.threads, error);
     if (status == EBPO_OK)
         status = ebpo_accel_make_within(&m->whole, &slice, m->info, space.most ? &space : NULL,
-                                        true, m->options.threads, error);
+                                        EBPO_ACCEL_PLANES, m->options.threads, error);
     if (m->whole)
         ebpo_model_count_leaves(m, m->whole, 1);
     return status == EBPO_OK ? mark_accel(m, m->whole, ebpo_holes_marks_max(m->info), error)
@@ -552,6 +554,7 @@ ebpo_status ebpo_context_new(ebpo_model *model, ebpo_context **out, ebpo_error *
     if (!*out)
         return ebpo_fail_memory(error, sizeof **out);
     (*out)->model = model;
+    (*out)->content = EBPO_ACCEL_NODES;
     return EBPO_OK;
 }
 
@@ -586,8 +589,8 @@ void ebpo_context_free(ebpo_context *c)
 static ebpo_status fail_limit(const ebpo_model *m, uint32_t below, ebpo_error *error)
 {
     uint64_t peak, keep, least;
-    if (estimate_subtree((ebpo_model *)m, ebpo_subtree_key(below, true), &peak, &keep, NULL) !=
-        EBPO_OK)
+    if (estimate_subtree((ebpo_model *)m, ebpo_subtree_key(below, EBPO_ACCEL_PLANES), &peak, &keep,
+                         NULL) != EBPO_OK)
         return EBPO_E_LIMIT;
     least = m->top->bytes + peak;
     while (m->top->bytes + ebpo_bytes_besides_subtrees(&m->options, least) + peak > least)

@@ -62,7 +62,7 @@ struct ebpo_context {
     ebpo_model *model;
     ebpo_accel *pinned;  /* the last used subtree, if it came from the cache; it stays in memory */
     uint64_t pinned_key; /* ebpo_subtree_key of `pinned` */
-    bool planes;         /* the query needs the planes of nodes in subtrees */
+    ebpo_accel_content content; /* what the query needs of subtrees */
     /* for a surface with its border: results get the winding number of the closed mesh of surface
      * and caps, and are not decided by the threshold */
     bool undecided;
@@ -115,16 +115,26 @@ EBPO_MUST_USE ebpo_status ebpo_check_ray_rows(const ebpo_ray *rays, uint64_t beg
 EBPO_MUST_USE ebpo_status ebpo_model_has_capacity(const ebpo_model *model, const ebpo_node *leaf,
                                                   ebpo_error *error);
 
-/* Returns the cache key of the subtree top->below[below], with or without the planes of its nodes.
- * (The subtree is loaded without planes if possible: few queries need them, and they take separate
- * reads.) */
-static inline uint64_t ebpo_subtree_key(uint64_t below, bool planes) { return below << 1 | planes; }
-
-/* Returns the data of the file (EBPO_NEEDS_...) that a subtree needs, with or without planes. */
-static inline uint32_t ebpo_subtree_needs(bool planes)
+/* Returns the cache key of the subtree top->below[below] with this content. (A subtree is loaded
+ * with no more content than a query needs. Few queries need planes, which take separate reads. For
+ * pairs of faces, nodes and leaves would take nearly half of the memory and a seventh of the time.)
+ */
+static inline uint64_t ebpo_subtree_key(uint64_t below, ebpo_accel_content content)
 {
-    return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH | EBPO_NEEDS_SOLID_OR_BORDER |
-           (planes ? (uint32_t)EBPO_NEEDS_PLANES : 0);
+    return below << 2 | content;
+}
+static inline uint32_t ebpo_subtree_of_key(uint64_t key) { return (uint32_t)(key >> 2); }
+static inline ebpo_accel_content ebpo_content_of_key(uint64_t key)
+{
+    return (ebpo_accel_content)(key & 3);
+}
+
+/* Returns the data of the file (EBPO_NEEDS_...) that a subtree with this content needs. */
+static inline uint32_t ebpo_subtree_needs(ebpo_accel_content content)
+{
+    return EBPO_NEEDS_ALWAYS | EBPO_NEEDS_MESH |
+           (content >= EBPO_ACCEL_NODES ? (uint32_t)EBPO_NEEDS_SOLID_OR_BORDER : 0) |
+           (content >= EBPO_ACCEL_PLANES ? (uint32_t)EBPO_NEEDS_PLANES : 0);
 }
 
 /* Reads a face's index in the source from the file, which has source indices. */
@@ -143,19 +153,23 @@ EBPO_MUST_USE static inline ebpo_status ebpo_model_source_face(const ebpo_model 
     return EBPO_OK;
 }
 
-/* Returns true if the context's pinned subtree is this one, with planes if the query needs them. */
+/* Returns true if the context's pinned subtree is this one, with the content that the query needs.
+ */
 static inline bool ebpo_context_has_pinned(const ebpo_context *c, uint64_t below)
 {
-    return c->pinned && c->pinned_key >> 1 == below && (c->pinned_key & 1 || !c->planes);
+    return c->pinned && ebpo_subtree_of_key(c->pinned_key) == below &&
+           ebpo_content_of_key(c->pinned_key) >= c->content;
 }
 
-/* Returns the subtree's cache key for the current query. A query that needs no planes uses the
- * subtree with planes if the cache has it. */
+/* Returns the subtree's cache key for the current query, which uses the subtree with more content
+ * than it needs if the cache has that. */
 static inline uint64_t ebpo_context_key(const ebpo_context *c, uint64_t below)
 {
-    uint64_t full = ebpo_subtree_key(below, true);
-    return c->planes || ebpo_cache_has(c->model->cache, full) ? full
-                                                              : ebpo_subtree_key(below, false);
+    uint64_t least = ebpo_subtree_key(below, c->content),
+             key = ebpo_subtree_key(below, EBPO_ACCEL_PLANES);
+    while (key > least && !ebpo_cache_has(c->model->cache, key))
+        key--;
+    return key;
 }
 
 /* Gets the subtree top->below[below], and pins it: the subtree stays in memory until the context

@@ -202,7 +202,7 @@ static ebpo_status model_children(void *holder, ebpo_node *gray, ebpo_node child
     ebpo_status status = EBPO_OK;
     if (gray->pruned)
         return EBPO_OK;
-    context->planes = true; /* cursors may request planes */
+    context->content = EBPO_ACCEL_PLANES; /* cursors may request planes */
     if (ebpo_node_is_subtree_root(gray))
         status = ebpo_model_enter(context, gray, error);
     for (unsigned octant = 0; octant < 8 && status == EBPO_OK; octant++)

@@ -422,7 +422,7 @@ ebpo_status ebpo_distance_within(ebpo_context *context, const double point[3],
     if (status != EBPO_OK)
         return status;
     /* In a subset, planes improve the bounds of omitted parts (as in ebpo_distance_many). */
-    context->planes = context->model->info->pruned;
+    context->content = context->model->info->pruned ? EBPO_ACCEL_PLANES : EBPO_ACCEL_NODES;
     memcpy(w.band.p, point, sizeof w.band.p);
     w.band.radius = wanted.radius;
     w.ahead = lists_ahead(&w);

@@ -1,8 +1,8 @@
 /* Measures the cost of loading by stage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N]
- * [--planes] [--scattered] [--whole]. Without --whole it loads N subtrees below the cut level, as
- * queries under a budget do: one after another from the middle of the file, or with --scattered in
- * an order without neighbours. Prints how many chunks a load decodes. With --whole it loads the
- * whole model N times, on one thread. Prints the CPU time of this thread. */
+ * [--faces | --planes] [--scattered] [--whole]. Without --whole it loads N subtrees below the cut
+ * level, as queries under a budget do: one after another from the middle of the file, or with
+ * --scattered in an order without neighbours. Prints how many chunks a load decodes. With --whole
+ * it loads the whole model N times, on one thread. Prints the CPU time of this thread. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,13 +31,14 @@ static void check(ebpo_status status, const ebpo_error *error)
     exit(EXIT_FAILURE);
 }
 
-static void make_and_free(stages *t, ebpo_slice *slice, const ebpo_info *info, bool planes)
+static void make_and_free(stages *t, ebpo_slice *slice, const ebpo_info *info,
+                          ebpo_accel_content content)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     ebpo_accel *s;
     double begin = now();
     t->faces += slice->mesh.face_count;
-    check(ebpo_accel_make(&s, slice, info, planes, 1, &error), &error);
+    check(ebpo_accel_make(&s, slice, info, content, 1, &error), &error);
     double made = now();
     t->bytes += s->bytes;
     ebpo_accel_free(s);
@@ -45,7 +46,8 @@ static void make_and_free(stages *t, ebpo_slice *slice, const ebpo_info *info, b
     t->release += now() - made;
 }
 
-static void load_below(stages *t, ebpo_model *m, uint64_t count, bool planes, bool scattered)
+static void load_below(stages *t, ebpo_model *m, uint64_t count, ebpo_accel_content content,
+                       bool scattered)
 {
     enum { FAR = 10007 }; /* a prime, so that every subtree has its turn */
     ebpo_error error = EBPO_ERROR_INIT;
@@ -58,10 +60,10 @@ static void load_below(stages *t, ebpo_model *m, uint64_t count, bool planes, bo
         check(ebpo_slice_read_parts(
                   &slice, m->chunks,
                   &m->top->below[(first + i * (scattered ? FAR : 1)) % m->top->below_count],
-                  ebpo_subtree_needs(planes), &error),
+                  ebpo_subtree_needs(content), &error),
               &error);
         t->read += now() - begin;
-        make_and_free(t, &slice, m->info, planes);
+        make_and_free(t, &slice, m->info, content);
     }
     ebpo_chunks_get_stats(m->chunks, &after);
     printf("%.1f chunks decoded in a load, %.1f found\n",
@@ -69,7 +71,7 @@ static void load_below(stages *t, ebpo_model *m, uint64_t count, bool planes, bo
            (double)(after.hits - before.hits) / (double)count);
 }
 
-static void load_whole(stages *t, const ebpo_file *file, uint64_t count, bool planes)
+static void load_whole(stages *t, const ebpo_file *file, uint64_t count, ebpo_accel_content content)
 {
     ebpo_error error = EBPO_ERROR_INIT;
     for (uint64_t i = 0; i < count; i++) {
@@ -77,17 +79,20 @@ static void load_whole(stages *t, const ebpo_file *file, uint64_t count, bool pl
         double begin = now();
         check(ebpo_slice_read_all(&slice, file, 1, &error), &error);
         t->read += now() - begin;
-        make_and_free(t, &slice, ebpo_file_info(file), planes);
+        make_and_free(t, &slice, ebpo_file_info(file), content);
     }
 }
 
 int main(int argc, char **argv)
 {
     uint64_t count = 0, memory = UINT64_C(256) << 20;
-    bool planes = false, whole = false, scattered = false;
+    ebpo_accel_content content = EBPO_ACCEL_NODES;
+    bool whole = false, scattered = false;
     for (int i = 2; i < argc; i++)
         if (strcmp(argv[i], "--planes") == 0)
-            planes = true;
+            content = EBPO_ACCEL_PLANES;
+        else if (strcmp(argv[i], "--faces") == 0)
+            content = EBPO_ACCEL_FACES;
         else if (strcmp(argv[i], "--scattered") == 0)
             scattered = true;
         else if (strcmp(argv[i], "--whole") == 0)
@@ -97,8 +102,8 @@ int main(int argc, char **argv)
         else if (strcmp(argv[i], "--count") == 0 && i + 1 < argc)
             count = strtoull(argv[++i], NULL, 10);
     if (argc < 2) {
-        fprintf(stderr, "usage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N] [--planes] "
-                        "[--scattered] [--whole]\n");
+        fprintf(stderr, "usage: bench_load FILE.ebpo.h5 [--memory BYTES] [--count N] "
+                        "[--faces | --planes] [--scattered] [--whole]\n");
         return 2;
     }
     ebpo_error error = EBPO_ERROR_INIT;
@@ -107,7 +112,7 @@ int main(int argc, char **argv)
     check(ebpo_open(argv[1], &file, &error), &error);
     count = count ? count : whole ? 1 : 1000;
     if (whole) {
-        load_whole(&t, file, count, true);
+        load_whole(&t, file, count, EBPO_ACCEL_PLANES);
     } else {
         ebpo_model_options options = EBPO_MODEL_OPTIONS_INIT;
         ebpo_model *m;
@@ -118,7 +123,7 @@ int main(int argc, char **argv)
                             "smaller --memory\n");
             return EXIT_FAILURE;
         }
-        load_below(&t, m, count, planes, scattered);
+        load_below(&t, m, count, content, scattered);
         ebpo_model_free(m);
     }
     ebpo_close(file);

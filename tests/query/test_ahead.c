@@ -21,7 +21,7 @@ static void load(ebpo_model *model, const uint64_t *below, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
         void *item;
-        uint64_t key = ebpo_subtree_key(below[i], false);
+        uint64_t key = ebpo_subtree_key(below[i], EBPO_ACCEL_NODES);
         ASSERT_OK(ebpo_cache_get(model->cache, key, &item, NULL, error));
         ebpo_cache_unpin(model->cache, key);
     }

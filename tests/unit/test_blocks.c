@@ -173,7 +173,7 @@ START_TEST(test_blocks_contain_faces_of_random_meshes)
     info->double_coordinates = doubles;
     ebpo_slice slice = one_leaf(&mesh);
     ebpo_accel *s = NULL;
-    ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
+    ASSERT_OK(ebpo_accel_make(&s, &slice, info, EBPO_ACCEL_NODES, 1, error));
     ck_assert(s->wide == doubles);
     check_estimate(s, &(ebpo_slice_size){ .leaves = 1, .new_faces = FACES }, info);
     unsigned largest = check_accel(s, &mesh, false);
@@ -245,7 +245,7 @@ START_TEST(test_cylinders_contain_faces_with_overflow)
     info->double_coordinates = doubles;
     ebpo_slice slice = one_leaf(&mesh);
     ebpo_accel *s = NULL;
-    ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
+    ASSERT_OK(ebpo_accel_make(&s, &slice, info, EBPO_ACCEL_NODES, 1, error));
     check_cylinders(s);
     ebpo_accel_free(s);
     ebpo_mesh_free(&mesh);
@@ -305,7 +305,7 @@ START_TEST(test_block_memory_stays_below_estimate)
     info->solid = true;
     ebpo_slice slice = spread_leaves(_i);
     ebpo_accel *s = NULL;
-    ASSERT_OK(ebpo_accel_make(&s, &slice, info, false, 1, error));
+    ASSERT_OK(ebpo_accel_make(&s, &slice, info, EBPO_ACCEL_NODES, 1, error));
     ck_assert_uint_eq(s->list_count, LEAVES / 2 * 3);
     check_estimate(s,
                    &(ebpo_slice_size){ .groups = 1 + 8 + 64, .leaves = LEAVES, .new_faces = NINES },
@@ -326,7 +326,7 @@ static void check_subtree(const query_model *m, const ebpo_node *root)
     ebpo_slice_size size;
     ASSERT_OK(ebpo_slice_measure(chunks, root, &size, error));
     ASSERT_OK(ebpo_slice_read(&slice, chunks, root, error));
-    ASSERT_OK(ebpo_accel_make(&s, &slice, &m->info, true, 1, error));
+    ASSERT_OK(ebpo_accel_make(&s, &slice, &m->info, EBPO_ACCEL_PLANES, 1, error));
     check_accel(s, &m->mesh, true);
     check_estimate(s, &size, &m->info);
     ebpo_accel_free(s);

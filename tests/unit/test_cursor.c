@@ -143,7 +143,8 @@ static void whole_open(whole *w, const char *name, int cut_level, bool shape)
         return;
     if (ebpo_file_info(w->file)->parts & EBPO_PART_MESH) {
         fine(ebpo_slice_read_all(&slice, w->file, 1, &error), &error);
-        fine(ebpo_accel_make(&w->subtree, &slice, ebpo_file_info(w->file), true, 1, &error),
+        fine(ebpo_accel_make(&w->subtree, &slice, ebpo_file_info(w->file), EBPO_ACCEL_PLANES, 1,
+                             &error),
              &error);
     }
     options.cut_level = cut_level;

@@ -336,21 +336,24 @@ START_TEST(test_subtree_count_limit)
     ebpo_info *info = head_of(3, 1);
     info->solid = false;
     ebpo_slice slice = fake_slice();
-    ck_assert_msg(ebpo_accel_make(&subtree, &slice, info, true, 1, &error) == EBPO_OK, "%s",
-                  error.message);
+    ck_assert_msg(ebpo_accel_make(&subtree, &slice, info, EBPO_ACCEL_PLANES, 1, &error) == EBPO_OK,
+                  "%s", error.message);
     ebpo_accel_free(subtree);
     slice = fake_slice();
     slice.mesh.face_count = UINT64_C(1) << 31; /* faces are numbered in 31 bits */
-    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, EBPO_ACCEL_PLANES, 1, &error),
+                     EBPO_E_LIMIT);
     slice = fake_slice();
     slice.level[0].plane_count = TWO32; /* planes are numbered in 32 bits */
-    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, EBPO_ACCEL_PLANES, 1, &error),
+                     EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "planes") != NULL, "%s", error.message);
     slice = fake_slice();
     slice.level[1].leaf_count = slice.level[1].group_count =
         EBPO_ENTRY_ZERO; /* nodes are numbered in 29 bits */
     slice.level_count = 2;
-    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, true, 1, &error), EBPO_E_LIMIT);
+    ck_assert_int_eq(ebpo_accel_make(&subtree, &slice, info, EBPO_ACCEL_PLANES, 1, &error),
+                     EBPO_E_LIMIT);
     ck_assert_msg(strstr(error.message, "nodes") != NULL, "%s", error.message);
     free(info);
 }

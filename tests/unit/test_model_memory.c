@@ -202,10 +202,11 @@ static ebpo_accel *read_within(const reading *r, const ebpo_node *node, ebpo_quo
 {
     ebpo_slice slice;
     ebpo_accel *subtree = NULL;
-    ebpo_status status =
-        ebpo_slice_read_within(&slice, r->chunks, node, ebpo_subtree_needs(true), space, NULL);
+    ebpo_status status = ebpo_slice_read_within(&slice, r->chunks, node,
+                                                ebpo_subtree_needs(EBPO_ACCEL_PLANES), space, NULL);
     if (status == EBPO_OK)
-        status = ebpo_accel_make_within(&subtree, &slice, &r->m->info, space, true, 1, NULL);
+        status = ebpo_accel_make_within(&subtree, &slice, &r->m->info, space, EBPO_ACCEL_PLANES, 1,
+                                        NULL);
     ck_assert(status == EBPO_OK || (status == EBPO_E_LIMIT && space->needed > space->most));
     return subtree;
 }
@@ -217,7 +218,7 @@ static void check_subtree(reading *r, const ebpo_node *node)
     ebpo_quota space = { .most = UINT64_MAX };
     ebpo_accel *subtree = read_within(r, node, &space);
     ebpo_accel_free(subtree);
-    uint64_t keep, needs = ebpo_subtree_needs(true);
+    uint64_t keep, needs = ebpo_subtree_needs(EBPO_ACCEL_PLANES);
     ASSERT_OK(
         ebpo_slice_measure_nodes(r->chunks, node, (uint32_t)needs, EBPO_SLICE_ALL, &size, error));
     space = (ebpo_quota){ 0 };

@@ -80,7 +80,9 @@ static ebpo_status separate_patches_find(separate_patches *u, uint64_t number,
     u->patch = NULL;
     if (model->whole)
         return find_patches(u, model->whole, u->two->faces[u->m]->slots, intersecting, error);
+    context->content = EBPO_ACCEL_FACES; /* other queries with this context need nodes */
     ebpo_status status = ebpo_context_subtree(context, (uint32_t)number, &subtree, error);
+    context->content = EBPO_ACCEL_NODES;
     if (status != EBPO_OK)
         return status;
     uint32_t *slots = ebpo_face_slots(subtree);

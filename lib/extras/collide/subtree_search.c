@@ -96,6 +96,8 @@ ebpo_status ebpo_subtree_search_begin(ebpo_subtree_search *s, const ebpo_collisi
             return ebpo_fail_memory(error, s->nodes.side[i].count);
         if (!q->model[i]->whole)
             status = ebpo_context_new(q->model[i], &s->context[i], error);
+        if (status == EBPO_OK && s->context[i])
+            s->context[i]->content = EBPO_ACCEL_FACES;
     }
     return status;
 }

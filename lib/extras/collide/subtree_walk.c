@@ -615,6 +615,7 @@ static ebpo_status subtree_walk_begin(subtree_walk *w, const ebpo_collision *col
             ebpo_status status = ebpo_context_new(collision->model[i], &w->context[i], error);
             if (status != EBPO_OK)
                 return status;
+            w->context[i]->content = EBPO_ACCEL_FACES;
         }
     return EBPO_OK;
 }
