@@ -9,6 +9,7 @@ its .json and .nodes.json. Checks the content checksum.
 """
 import hashlib
 import json
+import math
 import pathlib
 import sys
 
@@ -697,15 +698,16 @@ def check_border(file):
 
 def patch_triangles(code, count, vertices):
     """surface.md, section 3: the triangles, and (a, b, beyond) of each vertex that became new at an edge, else None."""
-    edges, begins, origin, out, at = [], {}, [], [], 0
+    edges, begins, origin, out, at, end = [], {}, [], [], 0, len(code)
 
     def number():
-        nonlocal at
+        nonlocal end
         value = 0
         for k in range(4):
-            value |= (code[at] & 127) << 7 * k
-            at += 1
-            if code[at - 1] < 128:
+            end -= 1
+            assert at <= end, "a number of a patch"
+            value |= (code[end] & 127) << 7 * k
+            if code[end] < 128:
                 return value
         raise AssertionError("a number of a patch")
 
@@ -740,6 +742,7 @@ def patch_triangles(code, count, vertices):
                 join(ring[k - 1], ring[k])
             out.append((a, b, c))
             continue
+        assert at < end, "bytes of a patch"
         edge, byte = edges.pop(), code[at]
         edge["open"] = False
         a, b, l, r = edge["from"], edge["to"], edge["left"], edge["right"]
@@ -771,8 +774,22 @@ def patch_triangles(code, count, vertices):
             left = known["left"] if known else first
             join(first, known or last)
             join(left, last)
-    assert at == len(code), "bytes of a patch"
+    assert at == end, "bytes of a patch"
     return out, origin + [None] * (vertices - len(origin))
+
+
+def patch_point(points, v, step, of):
+    """surface.md, section 4: the coordinates of vertex v of a patch, from those before it."""
+    a, b, c = points[list(of)].tolist() if of else 3 * [points[v - 1].tolist() if v else [0, 0, 0]]
+    guess = [(7 * (p + q) - 6 * r + 4) // 8 for p, q, r in zip(a, b, c)]
+    p, q = [x - r for x, r in zip(a, c)], [x - r for x, r in zip(b, c)]
+    n = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
+    k = max(range(3), key=lambda i: abs(n[i]))
+    out = [(x + d + 32768) % 65536 - 32768 for x, d in zip(guess, step)]
+    if n[k]:
+        rise = sum(n[i] * (out[i] - guess[i]) for i in range(3) if i != k)
+        out[k] = (guess[k] - math.floor(rise / n[k] + .5) + step[k] + 32768) % 65536 - 32768
+    return out
 
 
 def check_surface(file):
@@ -802,11 +819,7 @@ def check_surface(file):
         listed_triangles, origin = patch_triangles(code, triangles, corners)
         points = np.zeros((corners, 3), "i8")
         for v, (step, of) in enumerate(zip((rest >> 1) ^ -(rest & 1), origin)):
-            if of is None:
-                points[v] = points[v - 1] if v else 0
-            else:
-                points[v] = points[of[0]] + points[of[1]] - points[of[2]]
-            points[v] = (points[v] + step + 32768) % 65536 - 32768
+            points[v] = patch_point(points, v, step.tolist(), of)
         out.append((listed_triangles, points))
         sums = [sums[0] + triangles, sums[1] + corners, sums[2] + size]
     assert sums == [count["triangles"], count["vertices"], count["code_bytes"]], "patches and counts"

@@ -5,8 +5,8 @@
  * neighbouring triangle is not yet known. A byte of the code states the third vertex. It is often
  * new, or the other end of an open edge beside the first. Vertices are numbered in the order in
  * which the triangles use them first. The position of a vertex is stored as the difference from a
- * prediction: the fourth corner of a parallelogram. The other three corners are the vertices of the
- * triangle on the other side of the edge. Source: format-spec/surface.md. */
+ * prediction in the plane of the triangle on the other side of the edge, near the fourth corner of
+ * a parallelogram. Source: format-spec/surface.md. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -30,7 +30,7 @@ enum {
     LEFT_VERTEX = 1,  /* where the open edge before begins */
     RIGHT_VERTEX = 2, /* where the open edge after ends */
     NO_TRIANGLE = 3,  /* there is no triangle at the edge */
-    FAR_VERTEX = 4    /* any other vertex; its number follows */
+    FAR_VERTEX = 4    /* any other vertex, by a number */
 };
 
 /* Coordinates of a stored normal are 0 to NORMALS - 1. */
@@ -52,21 +52,24 @@ typedef struct open_edges {
     open_edge *edge; /* [triangles + 3] */
     uint32_t count;
     uint32_t *begins; /* [vertices] index of the last edge that was opened at a vertex, or NONE */
+    bool *rim;        /* [vertices] true: the vertex is at an edge without a triangle */
 } open_edges;
 
 static bool make_edges(open_edges *s, uint64_t triangles, uint64_t vertices)
 {
     s->edge = ebpo_alloc(triangles + 3, sizeof *s->edge);
     s->begins = ebpo_alloc(vertices, sizeof *s->begins);
+    s->rim = ebpo_alloc_zero(vertices, sizeof *s->rim);
     if (s->begins)
         memset(s->begins, 0xff, vertices * sizeof *s->begins);
-    return s->edge && s->begins;
+    return s->edge && s->begins && s->rim;
 }
 
 static void free_edges(open_edges *s)
 {
     free(s->edge);
     free(s->begins);
+    free(s->rim);
 }
 
 static void link_edges(open_edges *s, uint32_t before, uint32_t after)
@@ -112,6 +115,15 @@ static void end_edge(open_edges *s, const open_edge *e)
 {
     link_edges(s, e->before, NONE);
     link_edges(s, NONE, e->after);
+    s->rim[e->from] = s->rim[e->to] = true;
+}
+
+/* Notes that the edges that are still open have no triangle. */
+static void end_edges(open_edges *s)
+{
+    open_edge e;
+    while (take_edge(s, &e))
+        end_edge(s, &e);
 }
 
 /* Adds the other edges of the triangle (e->from, e->to, v) at the removed edge `e`, or removes them
@@ -154,22 +166,56 @@ static void add_edges(open_edges *s, const open_edge *e, uint32_t v)
     }
 }
 
-/* Vertices from which the position of a vertex is predicted: a + b - beyond. If `beyond` is NONE,
- * the prediction is the position of the vertex with the previous number. */
+/* Vertices from which the position of a vertex is predicted. If `beyond` is NONE, the prediction is
+ * the position of the vertex with the previous number. */
 typedef struct prediction {
     uint32_t a, b, beyond;
 } prediction;
 
-/* Predicts the position of vertex v from the positions `point` of the vertices with lower numbers.
- */
-static void predict_point(const int16_t *point, const prediction *p, uint32_t v, int32_t out[3])
+/* A predicted position, and the normal of the triangle from which it was predicted. */
+typedef struct predicted_point {
+    int32_t at[3];
+    double normal[3]; /* 0: no triangle */
+    int steep;        /* axis on which the normal is longest */
+} predicted_point;
+
+/* Predicts the position of vertex v from the positions `point` of the vertices with lower numbers:
+ * beyond the middle of a and b, by three quarters of the distance of `beyond` from there. */
+static predicted_point predict_point(const int16_t *point, const prediction *p, uint32_t v)
 {
-    for (int k = 0; k < 3; k++)
-        out[k] = v == 0 ? 0
-                 : p->beyond == NONE
-                     ? point[3 * (v - 1) + (uint32_t)k]
-                     : point[3 * p->a + (uint32_t)k] + point[3 * p->b + (uint32_t)k] -
-                           point[3 * p->beyond + (uint32_t)k];
+    predicted_point out = { { 0, 0, 0 }, { 0, 0, 0 }, 2 };
+    double from_a[3], from_b[3];
+    for (uint32_t k = 0; k < 3 && v; k++) {
+        if (p->beyond == NONE) {
+            out.at[k] = point[3 * (v - 1) + k];
+            continue;
+        }
+        int32_t a = point[3 * p->a + k], b = point[3 * p->b + k], c = point[3 * p->beyond + k];
+        out.at[k] = (int32_t)floor((7 * (a + b) - 6 * c) / 8.0 + 0.5);
+        from_a[k] = a - c;
+        from_b[k] = b - c;
+    }
+    if (v && p->beyond != NONE) {
+        const double *n = out.normal;
+        ebpo_vec3_cross(from_a, from_b, out.normal);
+        out.steep = fabs(n[0]) >= fabs(n[1]) && fabs(n[0]) >= fabs(n[2]) ? 0
+                    : fabs(n[1]) >= fabs(n[2])                           ? 1
+                                                                         : 2;
+    }
+    return out;
+}
+
+/* Returns the predicted coordinate i of `point`, whose coordinates except p->steep are known. On
+ * the axis p->steep, the plane of the triangle at these coordinates is the prediction. All numbers
+ * are integers below 2^53, so only the division rounds. */
+static int32_t predict_coordinate(const predicted_point *p, int i, const int16_t point[3])
+{
+    const double *n = p->normal;
+    int u = (i + 1) % 3, w = (i + 2) % 3;
+    if (i != p->steep || n[i] == 0)
+        return p->at[i];
+    double rise = n[u] * (point[u] - p->at[u]) + n[w] * (point[w] - p->at[w]);
+    return p->at[i] - (int32_t)floor(rise / n[i] + 0.5);
 }
 
 /* Returns the vertex whose colour is subtracted from the colour of v. */
@@ -195,6 +241,8 @@ typedef struct coder {
     uint32_t *vertex; /* [vertices] for each new number: the vertex of `in` */
     prediction *from; /* [vertices] for each new number: how the vertex's position is predicted */
     uint32_t next;    /* next new number */
+    uint8_t *numbers; /* bytes of numbers, which end the code in reverse order */
+    uint64_t number_bytes, number_capacity;
     bool short_of_memory;
 } coder;
 
@@ -210,9 +258,13 @@ static void put_byte(coder *c, uint32_t byte)
  * 1 if more bytes follow. */
 static void put_number(coder *c, uint32_t value)
 {
-    for (; value > 127; value >>= 7)
-        put_byte(c, value | 128);
-    put_byte(c, value);
+    for (bool last = false; !last; value >>= 7) {
+        last = value < 128;
+        if (ebpo_grow(&c->numbers, &c->number_capacity, c->number_bytes + 1, 1))
+            c->numbers[c->number_bytes++] = (uint8_t)(value | (last ? 0 : 128));
+        else
+            c->short_of_memory = true;
+    }
 }
 
 /* Returns the corner after corner i in the same triangle. */
@@ -317,9 +369,12 @@ static void put_triangles(coder *c)
         c->done[taken] = true;
         remaining--;
     }
+    end_edges(&c->edges);
+    while (c->number_bytes)
+        put_byte(c, c->numbers[--c->number_bytes]);
     for (uint32_t v = 0; v < c->in->vertex_count; v++)
         if (c->number[v] == NONE)
-            new_number(c, v, (prediction){ 0, 0, NONE });
+            c->edges.rim[new_number(c, v, (prediction){ 0, 0, NONE })] = true;
 }
 
 /* Returns false if the reader computes the normal of vertex v. */
@@ -352,10 +407,11 @@ static void set_normal(const double n[3], float out[3])
         out[k] = length > 0 ? (float)(n[k] / length) : k == 2;
 }
 
+/* Decodes a normal. Its coordinates are 1 more than those of encode_normal. */
 static void decode_normal(const uint8_t in[2], float out[3])
 {
-    double x = (double)(in[0] - NORMAL_STEPS) / NORMAL_STEPS,
-           y = (double)(in[1] - NORMAL_STEPS) / NORMAL_STEPS, z = 1 - fabs(x) - fabs(y);
+    double x = (double)(in[0] - 1 - NORMAL_STEPS) / NORMAL_STEPS,
+           y = (double)(in[1] - 1 - NORMAL_STEPS) / NORMAL_STEPS, z = 1 - fabs(x) - fabs(y);
     if (z < 0) {
         double folded = (1 - fabs(y)) * sign_of(x);
         y = (1 - fabs(x)) * sign_of(y);
@@ -374,28 +430,41 @@ static uint16_t encode_zigzag(int32_t value)
 
 static int32_t decode_zigzag(uint16_t code) { return code >> 1 ^ -(code & 1); }
 
+/* Writes the normals, those at the rim first, because most of the others are not stored. */
+static void put_normals(const coder *c)
+{
+    uint8_t last[2] = { 0, 0 }, *to = c->out->normal; /* last: the last stored normal */
+    memset(to, 0, 2 * c->in->vertex_count);
+    for (int rim = 1; rim >= 0; rim--) {
+        for (uint32_t v = 0; v < c->in->vertex_count; v++) {
+            const double *n = c->in->normal[c->vertex[v]];
+            uint8_t normal[2];
+            if (c->edges.rim[v] != rim)
+                continue;
+            if (n[0] != 0 || n[1] != 0 || n[2] != 0) {
+                encode_normal(n, normal);
+                for (int k = 0; k < 2; k++)
+                    to[k] = (uint8_t)((normal[k] - last[k] + NORMALS) % NORMALS + 1);
+                memcpy(last, normal, sizeof last);
+            }
+            to += 2;
+        }
+    }
+}
+
 /* Writes the rows of vertices, as differences. `point`: temporary memory for the vertices in the
  * order of their new numbers. */
 static void put_vertices(const coder *c, int16_t *point)
 {
-    uint8_t last[2] = { 0, 0 }; /* the last stored normal */
-    memset(c->out->normal, 0, 2 * c->in->vertex_count);
+    put_normals(c);
     for (uint32_t v = 0; v < c->in->vertex_count; v++) {
         uint32_t former = c->vertex[v], before = v ? vertex_before(&c->from[v], v) : 0;
-        int32_t predicted[3];
-        const double *n = c->in->normal[former];
-        memcpy(point + 3 * v, c->in->point + 3 * former, 3 * sizeof *point);
-        predict_point(point, &c->from[v], v, predicted);
-        for (uint32_t k = 0; k < 3; k++)
-            c->out->point[3 * v + k] = encode_zigzag(point[3 * v + k] - predicted[k]);
-        if (n[0] != 0 || n[1] != 0 || n[2] != 0) {
-            uint8_t normal[2];
-            encode_normal(n, normal);
-            for (int k = 0; k < 2; k++)
-                c->out->normal[2 * v + (uint32_t)k] =
-                    (uint8_t)((normal[k] - last[k] + NORMALS) % NORMALS + 1);
-            memcpy(last, normal, sizeof last);
-        }
+        predicted_point predicted = predict_point(point, &c->from[v], v);
+        int16_t *at = point + 3 * v;
+        memcpy(at, c->in->point + 3 * former, 3 * sizeof *point);
+        for (int k = 0; k < 3; k++)
+            c->out->point[3 * v + (uint32_t)k] =
+                encode_zigzag(at[k] - predict_coordinate(&predicted, k, at));
         for (uint32_t k = 0; k < 3 && c->out->colour; k++)
             c->out->colour[3 * v + k] =
                 (uint8_t)(c->in->colour[3 * former + k] -
@@ -445,6 +514,7 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
     free(c.number);
     free(c.vertex);
     free(c.from);
+    free(c.numbers);
     free(point);
     return made && !c.short_of_memory ? EBPO_OK : ebpo_fail_memory(error, vertices * 32);
 }
@@ -453,7 +523,7 @@ ebpo_status ebpo_patch_encode(const ebpo_patch_source *source, ebpo_patch_rows *
 
 /* State of decoding a patch. The functions below return false for a wrong code. */
 typedef struct decoder {
-    const uint8_t *code, *end; /* the next byte, and the end of the code */
+    const uint8_t *code, *end; /* the next byte; the end of the bytes that are left */
     open_edges edges;
     uint32_t next, vertices; /* number of vertices so far, and of the patch */
     prediction *from;        /* [vertices] how the position of each vertex is predicted */
@@ -463,7 +533,7 @@ static bool get_number(decoder *d, uint32_t *out)
 {
     *out = 0;
     for (unsigned shift = 0; shift < 28 && d->code < d->end; shift += 7) {
-        uint8_t byte = *d->code++;
+        uint8_t byte = *--d->end;
         *out |= (uint32_t)(byte & 127) << shift;
         if (!(byte & 128))
             return true;
@@ -556,6 +626,25 @@ typedef struct patch_rows {
     const uint16_t *point;
 } patch_rows;
 
+/* Replaces the stored normals' differences by their coordinates, 0, 0 where none is stored, in the
+ * order of the vertices. */
+static void take_normals(const bool *rim, const uint8_t *row, uint64_t vertices, uint8_t *out)
+{
+    uint8_t last[2] = { 0, 0 };
+    for (int pass = 1; pass >= 0; pass--) {
+        for (uint64_t v = 0; v < vertices; v++) {
+            if (rim[v] != pass)
+                continue;
+            for (int k = 0; k < 2; k++) {
+                if (is_stored(row, 0))
+                    last[k] = (uint8_t)((last[k] + row[k] + NORMALS - 1) % NORMALS);
+                out[2 * v + (uint64_t)k] = is_stored(row, 0) ? last[k] + 1 : 0;
+            }
+            row += 2;
+        }
+    }
+}
+
 /* Adds the normal of each triangle, weighted by area, to the normals of its vertices that are not
  * stored. point: [vertices][3] steps of the grid. */
 static void add_triangle_normals(const ebpo_info *info, const uint8_t *stored, const int16_t *point,
@@ -582,44 +671,44 @@ static void add_triangle_normals(const ebpo_info *info, const uint8_t *stored, c
     }
 }
 
-/* Sets the normals. point: [vertices][3] steps of the grid. */
+/* Sets the normals. stored: result of take_normals. point: [vertices][3] steps of the grid. */
 static void decode_normals(const ebpo_info *info, const uint8_t *stored, const int16_t *point,
                            ebpo_patch *out)
 {
-    uint8_t last[2] = { 0, 0 };
     memset(out->normals, 0, out->vertex_count * 3 * sizeof *out->normals);
     add_triangle_normals(info, stored, point, out);
     for (uint64_t v = 0; v < out->vertex_count; v++) {
         float *n = out->normals + 3 * v;
-        if (is_stored(stored, v)) {
-            for (int k = 0; k < 2; k++)
-                last[k] =
-                    (uint8_t)((last[k] + stored[2 * v + (uint64_t)k] + NORMALS - 1) % NORMALS);
-            decode_normal(last, n);
-        } else {
+        if (is_stored(stored, v))
+            decode_normal(stored + 2 * v, n);
+        else
             set_normal((double[3]){ (double)n[0], (double)n[1], (double)n[2] }, n);
-        }
     }
 }
 
+/* Sets positions, normals and colours. `point`, [vertices][3], and `normal`, [vertices][2], are
+ * temporary memory. */
 static void decode_vertices(const ebpo_info *info, const patch_rows *rows, const decoder *d,
-                            int16_t *point, ebpo_patch *out)
+                            int16_t *point, uint8_t *normal, ebpo_patch *out)
 {
     ebpo_box box = ebpo_root_box(info);
     ebpo_cell cell = { out->level, { out->at[0], out->at[1], out->at[2] } };
     for (uint32_t v = 0; v < out->vertex_count; v++) {
         uint32_t before = v ? vertex_before(&d->from[v], v) : 0;
-        int32_t predicted[3];
-        predict_point(point, &d->from[v], v, predicted);
-        for (uint32_t k = 0; k < 3; k++)
-            point[3 * v + k] =
-                (int16_t)(uint16_t)(uint32_t)(predicted[k] + decode_zigzag(rows->point[3 * v + k]));
+        predicted_point predicted = predict_point(point, &d->from[v], v);
+        int16_t *at = point + 3 * v;
+        for (int i = 1; i <= 3; i++) {
+            int k = (predicted.steep + i) % 3;
+            int32_t step = decode_zigzag(rows->point[3 * v + (uint32_t)k]);
+            at[k] = (int16_t)(uint16_t)(uint32_t)(predict_coordinate(&predicted, k, at) + step);
+        }
         for (uint32_t k = 0; k < 3 && out->colours; k++)
             out->colours[3 * v + k] =
                 (uint8_t)(rows->colour[3 * v + k] + (v ? out->colours[3 * before + k] : 0));
-        ebpo_patch_position(&box, cell, point + 3 * v, out->xyz + 3 * v);
+        ebpo_patch_position(&box, cell, at, out->xyz + 3 * v);
     }
-    decode_normals(info, rows->normal, point, out);
+    take_normals(d->edges.rim, rows->normal, out->vertex_count, normal);
+    decode_normals(info, normal, point, out);
 }
 
 void ebpo_patch_free(ebpo_patch *patch)
@@ -644,9 +733,12 @@ static bool decode_triangles(decoder *d, uint64_t count, uint32_t *triangle)
         if (triangle)
             memcpy(triangle + 3 * i, t, sizeof t);
     }
+    end_edges(&d->edges);
     /* vertices that no triangle uses come last */
-    for (; d->next < d->vertices; d->next++)
+    for (; d->next < d->vertices; d->next++) {
         d->from[d->next] = (prediction){ 0, 0, NONE };
+        d->edges.rim[d->next] = true;
+    }
     return d->code == d->end;
 }
 
@@ -668,21 +760,23 @@ static ebpo_status decode_patch(const ebpo_info *info, const patch_rows *rows, u
     bool made = make_edges(&d.edges, out->triangle_count, vertices);
     d.from = ebpo_alloc(vertices, sizeof *d.from);
     int16_t *point = ebpo_alloc(vertices, 3 * sizeof *point);
+    uint8_t *normal = ebpo_alloc(vertices, 2);
     out->xyz = ebpo_alloc(vertices, 3 * sizeof *out->xyz);
     out->normals = ebpo_alloc(vertices, 3 * sizeof *out->normals);
     out->colours = rows->colour ? ebpo_alloc(vertices, 3) : NULL;
     out->triangles = ebpo_alloc(out->triangle_count, 3 * sizeof *out->triangles);
     ebpo_status status = EBPO_OK;
-    if (!made || !d.from || !point || !out->xyz || !out->normals || !out->triangles ||
+    if (!made || !d.from || !point || !normal || !out->xyz || !out->normals || !out->triangles ||
         (rows->colour && !out->colours))
         status = ebpo_fail_memory(error, vertices * 48);
     if (status == EBPO_OK && !decode_triangles(&d, out->triangle_count, out->triangles))
         status = ebpo_patch_code_fails(EBPO_E_FORMAT, "", error);
     if (status == EBPO_OK)
-        decode_vertices(info, rows, &d, point, out);
+        decode_vertices(info, rows, &d, point, normal, out);
     free_edges(&d.edges);
     free(d.from);
     free(point);
+    free(normal);
     return status;
 }
 
@@ -861,7 +955,7 @@ static ebpo_status check_codes(const ebpo_check *check, const ebpo_surface *surf
         else if (!decode_triangles(&d, row[EBPO_PATCH_TRIANGLES], NULL))
             status = ebpo_patch_code_fails(check->as, check->shown, error);
         free_edges(&d.edges);
-        code = d.end;
+        code += row[EBPO_PATCH_CODE_BYTES];
     }
     free(from);
     return status;

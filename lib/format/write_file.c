@@ -449,9 +449,16 @@ static ebpo_status compress_gates(window_chunk *s, ebpo_chunk_coder *coder, int 
                                      EBPO_GATES_ENDS, s->stored, &s->stored_bytes);
 }
 
+/* Compression level of simplified surfaces: high, because they are small and are sent over networks
+ */
+enum { LEVEL_OF_SURFACES = 16 };
+
 static ebpo_status compress_chunk(window_chunk *s, ebpo_chunk_coder *coder, int level)
 {
     const ebpo_shape *shape = &s->array->shape;
+    if (!level && shape->pipeline == EBPO_PIPELINE_ZSTD &&
+        ebpo_schema[s->array->id].needs == EBPO_NEEDS_SURFACE)
+        level = LEVEL_OF_SURFACES;
     return s->array->gates ? compress_gates(s, coder, level)
                            : ebpo_chunk_encode(coder, shape->pipeline, level, shape->element_size,
                                                s->raw, s->raw_bytes, s->stored, &s->stored_bytes);
