@@ -28,9 +28,9 @@ enum { MOST_CORNERS = 512 };
  * new vertex from the middle of its edge. LEAST_WEIGHT: the same, as a part of the sum of all
  * weights; it is greater only for long thin triangles, whose equations would have no certain
  * digits. LEAST_COSINE: least cosine between the normals of a triangle before and after a collapse.
- */
+ * COARSE: greatest change of the surface by a collapse, divided by `fine`. */
 static const double OPEN_WEIGHT = 10, LENGTH_WEIGHT = 1e-4, PLACE_WEIGHT = 1e-3,
-                    LEAST_WEIGHT = 1e-9, LEAST_COSINE = 0.25;
+                    LEAST_WEIGHT = 1e-9, LEAST_COSINE = 0.25, COARSE = 16;
 
 /* Weighted sums over planes n . x + d = 0. nn: products of two coordinates of n; nd: n times d; dd:
  * d squared. Together they are a symmetric 4 x 4 matrix. area: sum of the areas of the vertex's
@@ -475,8 +475,8 @@ static void collapse_edges(simplifier *s, uint64_t target, double fine)
         if (s->age[c.from] != c.from_age || s->age[c.to] != c.to_age || s->head[c.from] == NONE ||
             s->head[c.to] == NONE)
             continue;
-        double most = fine * fine * (s->sum[c.from].area + s->sum[c.to].area);
-        if (s->alive <= target && c.cost > most)
+        double most = s->alive <= target ? fine : COARSE * fine;
+        if (c.cost > most * most * (s->sum[c.from].area + s->sum[c.to].area))
             continue;
         (void)place_vertex(s, c.from, c.to, at);
         if (!is_possible(s, c.from, c.to, at))

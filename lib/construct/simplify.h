@@ -33,11 +33,11 @@ typedef struct ebpo_patch_mesh {
 void ebpo_patch_mesh_free(ebpo_patch_mesh *mesh);
 
 /* Collapses edges until at most `target` triangles remain and each further collapse would change
- * the surface by more than about `fine`, or until every further collapse would flip a triangle or
- * change the topology. Fixed vertices remain at their positions. Removes unused vertices that are
- * not fixed. Returns EBPO_E_MEMORY, and EBPO_E_LIMIT for more than 2^32 / 3 triangles; then
- * nothing changes. Any thread. Source: Garland and Heckbert, Surface simplification using quadric
- * error metrics, 1997. */
+ * the surface by more than about `fine`, or until every further collapse would change it by more
+ * than about 16 * fine, flip a triangle or change the topology. Fixed vertices remain at their
+ * positions. Removes unused vertices that are not fixed. Returns EBPO_E_MEMORY, and EBPO_E_LIMIT
+ * for more than 2^32 / 3 triangles; then nothing changes. Any thread. Source: Garland and Heckbert,
+ * Surface simplification using quadric error metrics, 1997. */
 EBPO_MUST_USE ebpo_status ebpo_simplify(ebpo_patch_mesh *mesh, uint64_t target, double fine,
                                         ebpo_error *error);
 

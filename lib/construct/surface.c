@@ -5,8 +5,9 @@
  * The faces that are new below a node (no earlier leaf lists them) are a range of the model's
  * faces. If there are no patches below a node, the node's patch is made from these faces; otherwise
  * it is made from the patches of the node's children. Each patch has about a quarter as many
- * triangles as the faces or patches that it is made from, or fewer if the grid of its points does
- * not show the difference.
+ * triangles as the faces or patches that it is made from. It has fewer if the grid of its points
+ * does not show the difference, and more if collapses would move its vertices as far as those on
+ * its border move (below).
  *
  * A vertex is on the border of a patch if faces that do not belong to the patch also use the
  * vertex. Each border vertex is replaced by the vertex of its cell. Its cell is the cell that
@@ -347,9 +348,9 @@ static bool find_uses(surface_builder *b)
 
 /* --- the surface that a patch is made from --- */
 
-/* Hash table from keys to vertices of a mesh. */
+/* Hash table from keys to vertices of a mesh, or of its triangles. */
 typedef struct key_table {
-    uint32_t *slot; /* index of a vertex; UINT32_MAX: empty */
+    uint32_t *slot; /* index of a vertex or triangle; UINT32_MAX: empty */
     uint64_t slots;
 } key_table;
 
@@ -441,14 +442,42 @@ static void widen_uses(ebpo_patch_vertex *v, uint64_t lowest, uint64_t highest)
     v->highest = highest > v->highest ? highest : v->highest;
 }
 
+/* Returns true if each corner of triangle p is a corner of triangle q. */
+static bool is_within(const uint32_t p[3], const uint32_t q[3])
+{
+    bool within = true;
+    for (int k = 0; k < 3; k++)
+        within = within && (p[k] == q[0] || p[k] == q[1] || p[k] == q[2]);
+    return within;
+}
+
+/* Returns true if a triangle of the mesh in the hash table `seen` has the same corners as t, in any
+ * order. Otherwise enters the next triangle of the mesh. */
+static bool is_repeated(const ebpo_patch_mesh *mesh, key_table *seen, const uint32_t t[3])
+{
+    uint64_t i = ebpo_hash_number(t[0]) + ebpo_hash_number(t[1]) + ebpo_hash_number(t[2]);
+    for (i &= seen->slots - 1; seen->slot[i] != UINT32_MAX; i = (i + 1) & (seen->slots - 1)) {
+        const uint32_t *other = mesh->triangle + 3 * (uint64_t)seen->slot[i];
+        if (is_within(t, other) && is_within(other, t))
+            return true;
+    }
+    seen->slot[i] = (uint32_t)mesh->triangle_count;
+    return false;
+}
+
 /* Adds the faces first .. end - 1 of the model to a mesh. Also adds faces with repeated corners,
- * because the error of the patch must bound the distance of these faces, too. Returns false when
- * out of memory. */
+ * because the error of the patch must bound the distance of these faces, too. Of faces with the
+ * same corners, such as the two sides of a wall without thickness, adds the first only: they are
+ * the same points, and no edge of both could collapse. Returns false when out of memory. */
 static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t first, uint64_t end)
 {
     const uint32_t *corner = b->tree->mesh.faces + 3 * first;
-    key_table table = { NULL, 0 };
-    bool made = true, is_new;
+    key_table table = { NULL, 0 }, seen = { NULL, ebpo_hash_slots(2 * (end - first)) };
+    bool made, is_new;
+    seen.slot = ebpo_alloc(seen.slots, sizeof *seen.slot);
+    made = seen.slot != NULL;
+    if (made)
+        memset(seen.slot, 0xff, seen.slots * sizeof *seen.slot);
     for (uint64_t face = first; face < end && made; face++, corner += 3) {
         scaled_face f;
         uint32_t t[3] = { 0, 0, 0 };
@@ -470,9 +499,10 @@ static bool add_faces(const surface_builder *b, ebpo_patch_mesh *mesh, uint64_t 
             }
             to->weight += f.weight;
         }
-        made = made && add_triangle(mesh, t);
+        made = made && (is_repeated(mesh, &seen, t) || add_triangle(mesh, t));
     }
     free(table.slot);
+    free(seen.slot);
     return made;
 }
 

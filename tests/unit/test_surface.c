@@ -603,6 +603,58 @@ START_TEST(test_too_many_triangles)
 }
 END_TEST
 
+/* Collapses that change the surface by much more than `fine` are not made, although more triangles
+ * than the target remain: an octahedron does not become flat. */
+START_TEST(test_shapes_remain)
+{
+    for (int flat = 0; flat < 2; flat++) {
+        ebpo_error error = EBPO_ERROR_INIT;
+        ebpo_patch_mesh mesh = { .vertex = calloc(6, sizeof *mesh.vertex),
+                                 .triangle = malloc(8 * 3 * sizeof *mesh.triangle),
+                                 .vertex_count = 6,
+                                 .vertex_capacity = 6,
+                                 .triangle_count = 8,
+                                 .triangle_capacity = 8 };
+        for (uint32_t v = 0; v < 6; v++)
+            mesh.vertex[v].at[v / 2] = v % 2 ? 1 : -1;
+        for (uint32_t i = 0; i < 8; i++) {
+            uint32_t x = i & 1, y = 2 + (i >> 1 & 1), z = 4 + (i >> 2), odd = (x + y + z) % 2;
+            uint32_t t[3] = { x, odd ? y : z, odd ? z : y };
+            memcpy(mesh.triangle + 3 * (uint64_t)i, t, sizeof t);
+        }
+        must(ebpo_simplify(&mesh, 1, flat ? 1 : 0.01, &error), "simplify", &error);
+        if (flat)
+            ck_assert_uint_lt(mesh.triangle_count, 8);
+        else
+            ck_assert_uint_eq(mesh.triangle_count, 8);
+        ebpo_patch_mesh_free(&mesh);
+    }
+}
+END_TEST
+
+/* Faces that are repeated with the other orientation, which are the sides of a wall without
+ * thickness, are simplified like single faces. */
+START_TEST(test_doubled_walls)
+{
+    ebpo_tree tree;
+    ebpo_error error = EBPO_ERROR_INIT;
+    ebpo_patch patch;
+    ebpo_mesh mesh = waves(40, 40);
+    uint64_t count = mesh.face_count;
+    mesh.faces = realloc(mesh.faces, 6 * count * sizeof *mesh.faces);
+    for (uint64_t i = 0; i < 3 * count; i++)
+        mesh.faces[3 * count + i] = mesh.faces[i - i % 3 + (3 - i % 3) % 3];
+    mesh.face_count = 2 * count;
+    build(&tree, mesh, 1);
+    must(ebpo_surface_decode(&tree.surface, &tree.info, 0, &patch, &error), "decode", &error);
+    ck_assert_uint_eq(patch.face_count, 2 * count);
+    ck_assert_uint_le(patch.triangle_count, count / 4);
+    ck_assert_double_lt(patch.error, 0.05);
+    ebpo_patch_free(&patch);
+    ebpo_tree_free(&tree);
+}
+END_TEST
+
 /* Strips of triangles whose corners are on a line, except for rounding errors: their planes have no
  * certain digits, but vertices stay near the line. */
 START_TEST(test_thin_triangles_stay_in_place)
@@ -996,6 +1048,8 @@ TEST_SUITE(surface)
     tcase_add_test(tests, test_few_faces_have_none);
     tcase_add_test(tests, test_far_from_the_origin);
     tcase_add_test(tests, test_too_many_triangles);
+    tcase_add_test(tests, test_shapes_remain);
+    tcase_add_test(tests, test_doubled_walls);
     tcase_add_test(tests, test_thin_triangles_stay_in_place);
     tcase_add_test(tests, test_triangles_that_share_an_edge);
     tcase_add_test(tests, test_decoding_reads_one_row);
