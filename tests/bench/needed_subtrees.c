@@ -114,7 +114,8 @@ static void request_all(const char *url, const ebpo_model_options *how, const bo
     for (uint32_t i = 0; below && i < m->top->below_count; i++)
         if (needed[i])
             below[count++] = i;
-    ebpo_top_hint(m->top, m->chunks, below, count, ebpo_subtree_needs(false) | EBPO_NEEDS_MAPS);
+    ebpo_top_hint(m->top, m->chunks, below, count, ebpo_subtree_needs(false) | EBPO_NEEDS_MAPS,
+                  EBPO_LEVELS_MAX);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_accel *subtree;
         check(ebpo_context_subtree(c, below[i], &subtree, &error));
