@@ -144,28 +144,34 @@ static ebpo_status decode_item(const ebpo_chunks *c, const ebpo_array_in *array,
     }
 }
 
-/* Adds to the hints those chunks of [begin, end) of an array that are not in memory. */
-static void hint_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
+/* Adds to the hints those chunks of [begin, end) of an array that are not in memory. Returns true
+ * if there are such chunks. */
+static bool hint_missing(ebpo_chunks *c, ebpo_hints *e, const ebpo_array_in *array, uint64_t begin,
                          uint64_t end)
 {
+    bool missing = false;
     for (uint64_t i = begin; i < end; i++)
-        if (!ebpo_cache_has(c->cache, key_of(array, i)))
+        if (!ebpo_cache_has(c->cache, key_of(array, i))) {
             ebpo_hint_chunks(e, array, i, i + 1);
+            missing = true;
+        }
+    return missing;
 }
 
-void ebpo_chunks_hint(ebpo_chunks *c, ebpo_hints *e, ebpo_array_id id, int level, uint64_t row,
+bool ebpo_chunks_hint(ebpo_chunks *c, ebpo_hints *e, ebpo_array_id id, int level, uint64_t row,
                       uint64_t rows)
 {
     const ebpo_array_in *array = ebpo_reader_array(c->file, id, level);
     if (!ebpo_hints_wanted(e) || !array->present || rows == 0 || row >= array->shape.rows)
-        return;
+        return false;
     if (c->collecting)
         (void)ebpo_chunks_missing(c, id, level, row, rows, c->collecting);
     if (c->counted)
-        return;
+        return false;
     uint64_t remaining = array->shape.rows - row,
              last = row + (rows < remaining ? rows : remaining) - 1;
-    hint_missing(c, e, array, row / array->shape.chunk_rows, last / array->shape.chunk_rows + 1);
+    return hint_missing(c, e, array, row / array->shape.chunk_rows,
+                        last / array->shape.chunk_rows + 1);
 }
 
 /* Sends prefetch hints for a chunk and adjacent chunks, which are likely to be read next. A request

@@ -117,8 +117,46 @@ void ebpo_context_hint(const ebpo_context *c, const uint32_t *below, uint64_t co
         if (!ebpo_cache_has(m->cache, ebpo_context_key(c, below[i])))
             needed[absent++] = below[i];
     ebpo_top_hint(m->top, m->chunks, needed, absent,
-                  ebpo_subtree_needs(c->content) | EBPO_NEEDS_MAPS); /* MAPS: for results */
+                  ebpo_subtree_needs(c->content) | (m->without_maps ? 0 : EBPO_NEEDS_MAPS),
+                  EBPO_LEVELS_MAX);
     free(needed);
+}
+
+ebpo_status ebpo_context_read_envelopes(ebpo_context *c, const uint32_t *below, uint64_t count,
+                                        ebpo_error *error)
+{
+    const ebpo_model *m = c->model;
+    ebpo_status status = EBPO_OK;
+    if (!c->envelopes_of)
+        c->envelopes_of = ebpo_alloc_zero(m->top->below_count, sizeof(ebpo_top *));
+    if (!c->envelopes_of)
+        return ebpo_fail_memory(error, m->top->below_count * sizeof(ebpo_top *));
+    ebpo_top_hint(m->top, m->chunks, below, count, EBPO_TOP_ENVELOPES,
+                  m->top->cut_level + EBPO_DEEP_LEVELS);
+    for (uint64_t i = 0; i < count && status == EBPO_OK; i++) {
+        ebpo_top *read;
+        status = ebpo_top_read_subtree(&read, m->chunks, &m->top->below[below[i]], error);
+        if (status != EBPO_OK)
+            break;
+        if (!ebpo_skeletons_take(m->skeletons, read->bytes)) {
+            ebpo_top_free(read);
+            break;
+        }
+        c->envelopes_of[below[i]] = read;
+        c->envelope_count++;
+    }
+    return status == EBPO_E_LIMIT ? EBPO_OK : status;
+}
+
+void ebpo_context_drop_envelopes(ebpo_context *c)
+{
+    for (uint64_t i = 0; c->envelope_count; i++)
+        if (c->envelopes_of[i]) {
+            ebpo_skeletons_give_back(c->model->skeletons, c->envelopes_of[i]->bytes);
+            ebpo_top_free(c->envelopes_of[i]);
+            c->envelopes_of[i] = NULL;
+            c->envelope_count--;
+        }
 }
 
 /* --- batches --- */
@@ -213,7 +251,6 @@ void ebpo_batch_begin(ebpo_batch *b)
     const ebpo_model *m = b->context->model;
     ebpo_box box = ebpo_model_box(m);
     b->pending_home = EBPO_NO_SUBTREE;
-    b->context->deep_pending = false;
     if (b->as_given)
         return;
     if (m->whole && b->searches_around && are_scattered(&box, b->points, b->count))

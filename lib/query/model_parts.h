@@ -45,6 +45,16 @@ EBPO_MUST_USE ebpo_status ebpo_top_read(ebpo_top **out, const ebpo_file *file, i
 EBPO_MUST_USE ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file,
                                                   int cut_level, unsigned threads,
                                                   ebpo_error *error);
+/* Number of levels of deep bounds (nearest.h). Each level takes four times the memory of the level
+ * above it, and a third level would save only a tenth of the remaining loads
+ * (docs/develop/design.md). */
+enum { EBPO_DEEP_LEVELS = 2 };
+/* Reads the envelopes of the first EBPO_DEEP_LEVELS levels below a gray node of a file that is no
+ * subset. Level 0 of the result is this node. */
+EBPO_MUST_USE ebpo_status ebpo_top_read_subtree(ebpo_top **out, ebpo_chunks *chunks,
+                                                const ebpo_node *root, ebpo_error *error);
+/* The data that ebpo_top_read_subtree needs. */
+enum { EBPO_TOP_ENVELOPES = EBPO_NEEDS_ALWAYS | EBPO_NEEDS_PLANES };
 void ebpo_top_free(ebpo_top *top);
 
 /* ebpo_top_estimate and ebpo_top_envelopes_estimate return upper bounds of the bytes that
@@ -56,9 +66,10 @@ uint64_t ebpo_top_envelopes_estimate(const ebpo_info *info, int cut_level);
 /* For a remote file with a table of subtrees: sends prefetch hints for `count` subtrees, by their
  * indices in top->below. A leaf that is in no subtree of the file is loaded like a subtree; its
  * list of faces is read here, because only this list names the faces that it shares with other
- * leaves. `needs`: EBPO_NEEDS_... (schema.h). */
+ * leaves. `needs`: EBPO_NEEDS_... (schema.h); without EBPO_NEEDS_MESH, all are subtrees of the
+ * file, and only nodes down to `last_level` are hinted. */
 void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *below, uint64_t count,
-                   uint32_t needs);
+                   uint32_t needs, int last_level);
 
 /* --- skeletons ---
  *

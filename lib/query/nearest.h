@@ -100,15 +100,15 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *context);
  * that was loaded before, its skeleton gives a good bound: query/model_parts.h.) All deep bounds
  * are read together, after queries have spent about as much time on loading subtrees without need
  * as reading deep bounds takes. So they delay neither opening a model nor queries along a path.
- * For a remote file, a query reads them before it loads many subtrees: as soon as they have a small
- * part of the bytes of the subtrees that may have the nearest face. For 11 points deep inside a
- * model of 4.3 million faces, a query takes 266 requests and 7.57 MB without deep bounds, 47
- * requests and 2.89 MB with them. Their memory counts towards the quota of skeletons. */
+ * Their memory counts towards the quota of skeletons. Queries of a remote file do not use them, but
+ * read the same envelopes of the subtrees near the point only (load_ahead.h), as soon as many of
+ * these subtrees may have the nearest face. For 11 points deep inside a model of 4.3 million faces,
+ * a query takes 266 requests and 7.57 MB without envelopes, 24 requests and 1.42 MB with them. */
 
-/* Reads deep bounds of `levels` levels, or of fewer levels if the quota is too small or the file
- * has fewer levels below the cut level. Does nothing if some were read before. Fails only if bytes
- * are not available yet (EBPO_E_PENDING); if the file cannot be read, later queries fail. */
-EBPO_MUST_USE ebpo_status ebpo_deep_bounds_make(ebpo_model *model, int levels, ebpo_error *error);
+/* Reads deep bounds of EBPO_DEEP_LEVELS levels, or of fewer levels if the quota is too small or the
+ * file has fewer levels below the cut level. Does nothing if some were read before. If the file
+ * cannot be read, later queries fail. */
+void ebpo_deep_bounds_make(ebpo_model *model);
 
 /* Counts `loaded` subtrees that a query has loaded and that had no skeleton before. Makes the deep
  * bounds when enough such subtrees have been loaded. Any thread may call this function. */

@@ -8,7 +8,7 @@
  * hierarchy over faces, skeleton.c). If it never was, its bound comes from the envelopes of the
  * first levels below the cut level (*deep bounds*, nearest.h). Deep bounds are read after queries
  * have loaded many subtrees that they would not have needed with better bounds. For a remote file,
- * they are read before a query loads many subtrees. */
+ * a query reads these envelopes only for the subtrees near its point, before it loads many. */
 #include "core/strict_fp.h"
 
 #include <math.h>
@@ -55,12 +55,9 @@ ebpo_ranked ebpo_queue_pop(ebpo_context *c)
     return first;
 }
 
-/* Greatest number of levels of deep bounds. Each level takes four times the memory of the level
- * above it. For a local file, a third level would save only a tenth of the remaining loads
- * (docs/develop/design.md). For a remote file, a cold query that is far from all faces loads 22
- * subtrees with three levels and 30 with two (means of 11 points deep inside a model of 4.3 million
- * faces), and the third level has the bytes of five subtrees. */
-enum { DEEP_LEVELS = 2, DEEP_LEVELS_REMOTE = 3 };
+/* For a remote file, the least number of subtrees whose envelopes are read together. (With 24, 11
+ * points deep inside a model of 4.3 million faces take 3 % more bytes, with 48 12 % more.) */
+enum { ENVELOPES_LEAST = 8 };
 /* A *new* subtree has no skeleton, because it was never loaded. A query near the previous query
  * loads at most a few new subtrees. If a query loads more than NEW_NEEDED new subtrees, the excess
  * counts as loaded without need. Deep bounds are read after LOADS_TO_READ loads without need, which
@@ -69,22 +66,15 @@ enum { NEW_NEEDED = 4, LOADS_TO_READ = 64 };
 
 /* --- deep bounds --- */
 
-/* Returns the level that is `levels` below the cut level, or the last level of the file. */
-static int deep_level(const ebpo_model *m, int levels)
-{
-    int level = m->top->cut_level + levels, last = m->info->level_count - 1;
-    return level < last ? level : last;
-}
-
 /* Reads the deep bounds of the levels down to `level`. Returns EBPO_E_LIMIT if the quota of
  * skeletons is too small. */
-static ebpo_status read_levels(ebpo_model *m, int level, ebpo_error *error)
+static ebpo_status read_levels(ebpo_model *m, int level)
 {
     uint64_t estimate = ebpo_top_envelopes_estimate(m->info, level);
     ebpo_top *deep = NULL;
     if (!ebpo_skeletons_take(m->skeletons, estimate))
         return EBPO_E_LIMIT;
-    ebpo_status status = ebpo_top_read_envelopes(&deep, m->file, level, m->options.threads, error);
+    ebpo_status status = ebpo_top_read_envelopes(&deep, m->file, level, m->options.threads, NULL);
     if (status != EBPO_OK)
         deep = NULL;
     ebpo_skeletons_give_back(m->skeletons, estimate - (deep ? deep->bytes : 0));
@@ -92,19 +82,14 @@ static ebpo_status read_levels(ebpo_model *m, int level, ebpo_error *error)
     return status == EBPO_E_LIMIT ? EBPO_OK : status;
 }
 
-ebpo_status ebpo_deep_bounds_make(ebpo_model *m, int levels, ebpo_error *error)
+void ebpo_deep_bounds_make(ebpo_model *m)
 {
-    ebpo_status status = EBPO_E_LIMIT;
-    ebpo_error why = EBPO_ERROR_INIT;
+    int level = m->top->cut_level + EBPO_DEEP_LEVELS, last = m->info->level_count - 1;
     if (!m->skeletons || atomic_exchange(&m->deep_begun, true))
-        return EBPO_OK;
-    for (int level = deep_level(m, levels); level > m->top->cut_level && status == EBPO_E_LIMIT;
-         level--)
-        status = read_levels(m, level, &why);
-    if (status != EBPO_E_PENDING)
-        return EBPO_OK;
-    m->deep_begun = false;
-    return ebpo_fail_with(error, &why);
+        return;
+    level = level < last ? level : last;
+    while (level > m->top->cut_level && read_levels(m, level) == EBPO_E_LIMIT)
+        level--;
 }
 
 void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
@@ -113,8 +98,7 @@ void ebpo_deep_bounds_report(ebpo_model *m, unsigned loaded)
         return;
     uint64_t more = loaded - NEW_NEEDED;
     if (atomic_fetch_add(&m->new_loads, more) + more >= LOADS_TO_READ)
-        (void)!ebpo_deep_bounds_make(
-            m, DEEP_LEVELS, NULL); /* The file is local, so the result is never EBPO_E_PENDING. */
+        ebpo_deep_bounds_make(m);
 }
 
 /* A search for the least lower bound among the deepest nodes of the deep bounds. */
@@ -192,15 +176,15 @@ static void search_deep(deep_search *g, const deep_node *gray)
 }
 
 /* Returns a guaranteed lower bound of the distance to the faces in the cell of a subtree's root,
- * from the envelopes of the nodes above it and from deep bounds. `lower`: a known lower bound; the
- * result is at least this bound. Once a bound is beyond `limit`, no better bound is searched for.
- * *upper: is lowered to an upper bound of the distance to the model's nearest face, if one is
- * found; NULL is allowed. (For a far point, all bounds are keys.) Any thread may call this
- * function. */
-static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node, double lower,
-                              double limit, double *upper)
+ * from the envelopes of the nodes above it and below it: those that the context has read, or deep
+ * bounds. `lower`: a known lower bound; the result is at least this bound. Once a bound is beyond
+ * `limit`, no better bound is searched for. *upper: is lowered to an upper bound of the distance to
+ * the model's nearest face, if one is found; NULL is allowed. (For a far point, all bounds are
+ * keys.) Any thread may call this function. */
+static double bound_below_cut(const ebpo_context *c, const ebpo_ranking *ranking,
+                              const ebpo_node *node, double lower, double limit, double *upper)
 {
-    const ebpo_model *m = ranking->model;
+    const ebpo_model *m = c->model;
     const ebpo_top *top =
         m->skeletons ? atomic_load_explicit(&m->deep, memory_order_acquire) : NULL;
     top = top ? top : m->top;
@@ -218,6 +202,11 @@ static double bound_below_cut(const ebpo_ranking *ranking, const ebpo_node *node
         unsigned octant = ebpo_cell_octant(node->cell, at.cell.level);
         at.entry = ebpo_table_child(&top->nodes, at.entry, octant);
         at.cell = ebpo_cell_child(at.cell, octant);
+    }
+    const ebpo_top *read = ebpo_context_envelopes(c, ebpo_entry_value(node->entry));
+    if (read) {
+        top = read;
+        at.entry = read->nodes.root;
     }
     if (ebpo_entry_kind_of(at.entry) != EBPO_ENTRY_GRAY)
         return at.lower;
@@ -242,7 +231,7 @@ typedef struct searching {
     ebpo_ranking ranking;
     unsigned new_loads; /* number of new subtrees that this search loaded */
     double hinted;      /* prefetch hints were sent for all new subtrees up to this bound */
-    bool limited;       /* limit_by_cells was called */
+    bool full;          /* the quota for envelopes is used up */
 } searching;
 
 /* Adds a node to the queue if its bound is within the limit. */
@@ -310,21 +299,22 @@ static ebpo_node node_below(const ebpo_model *m, uint32_t below)
 }
 
 /* A list of new subtrees, other than `but`, that this query has not searched and that may have a
- * face within `limit`. */
+ * face within `limit`, the nearest first. */
 typedef struct needed {
     const searching *g;
-    double limit;
+    double limit; /* if the list is full, lowered to the bound of its last subtree */
     uint32_t but;
-    bool all; /* false: the list is full, and there may be more such subtrees */
+    bool without; /* only subtrees of which the context has no envelopes */
     unsigned count;
     uint32_t below[EBPO_CACHE_AHEAD + 1]; /* with space for `but` */
+    double lower[EBPO_CACHE_AHEAD];       /* lower bounds of the distance */
 } needed;
 
 /* Adds the subtrees at or below a node. `lower`: lower bound of the distance to the node. */
 static void add_needed(needed *l, ebpo_node node, double lower)
 {
     const searching *g = l->g;
-    if (!l->all || lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
+    if (lower > l->limit || ebpo_node_is_uniform(&node) || node.pruned)
         return;
     if (!ebpo_node_is_subtree_root(&node)) {
         ebpo_ranked child[8];
@@ -336,16 +326,25 @@ static void add_needed(needed *l, ebpo_node node, double lower)
     uint32_t below = ebpo_entry_value(node.entry);
     if (below == l->but || is_searched(g->c, below) ||
         ebpo_skeletons_find(g->c->model->skeletons, below) ||
-        bound_below_cut(&g->ranking, &node, lower, l->limit, NULL) > l->limit)
+        (l->without && (node.type != EBPO_GRAY || ebpo_context_envelopes(g->c, below))))
         return;
-    l->all = l->count < EBPO_CACHE_AHEAD;
-    if (l->all)
-        l->below[l->count++] = below;
+    lower = bound_below_cut(g->c, &g->ranking, &node, lower, l->limit, NULL);
+    if (lower > l->limit)
+        return;
+    unsigned at = l->count < EBPO_CACHE_AHEAD ? l->count++ : EBPO_CACHE_AHEAD - 1;
+    for (; at > 0 && l->lower[at - 1] > lower; at--) {
+        l->lower[at] = l->lower[at - 1];
+        l->below[at] = l->below[at - 1];
+    }
+    l->lower[at] = lower;
+    l->below[at] = below;
+    if (l->count == EBPO_CACHE_AHEAD)
+        l->limit = l->lower[EBPO_CACHE_AHEAD - 1];
 }
 
-static needed list_needed(const searching *g, double limit, uint32_t but)
+static needed list_needed(const searching *g, double limit, uint32_t but, bool without)
 {
-    needed l = { .g = g, .limit = limit, .but = but, .all = true };
+    needed l = { .g = g, .limit = limit, .but = but, .without = without };
     add_needed(&l, ebpo_model_root(g->c->model), 0);
     return l;
 }
@@ -355,21 +354,20 @@ static needed list_needed(const searching *g, double limit, uint32_t but)
  * of the search is between the bound of this subtree and the limit; the subtrees with bounds in the
  * first 3/16 of this interval are requested. Measured for 60 points anywhere in the box of a model
  * of 4.3 million faces, per query: 11.5 round trips and 999 kB without these hints; 6.9 round trips
- * and 1,040 kB with 3/16; 6.0 round trips and 1,103 kB with 1/2. After limit_by_cells, the
- * interval is short, and the first 17/20 are requested, also before a face is found. (For the
- * points of DEEP_LEVELS_REMOTE, 1/2 takes 5.1 sets of requests a query and fetches the 239 needed
- * subtrees; 9/10 takes 2.1 sets and fetches 245; 1 takes one set and fetches 298.) For far points,
- * whose bounds are keys (point_bounds.h), no hints are sent. */
+ * and 1,040 kB with 3/16; 6.0 round trips and 1,103 kB with 1/2. If envelopes of subtrees were
+ * read, the bounds are better, and the first 17/20 are requested. Before a face is found, only this
+ * subtree is requested. For far points, whose bounds are keys (point_bounds.h), no hints are sent.
+ */
 static void hint_subtrees(searching *g, uint32_t below, double lower)
 {
     ebpo_context *c = g->c;
-    double share = g->limited ? 0.85 : g->n->found ? 0.1875 : 0;
+    double share = !g->n->found ? 0 : c->envelope_count ? 0.85 : 0.1875;
     double limit = share > 0 ? lower + (g->n->limit - lower) * share : lower;
     if (g->ranking.far || lower <= g->hinted || !ebpo_input_prefetches(&c->model->file->in) ||
         is_in_memory(c, below))
         return;
-    needed list = list_needed(g, limit, below);
-    g->hinted = list.all ? limit : lower;
+    needed list = list_needed(g, limit, below, false);
+    g->hinted = list.limit;
     list.below[list.count] = below;
     ebpo_context_hint(c, list.below, list.count + 1);
 }
@@ -381,6 +379,9 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
     uint32_t below = ebpo_entry_value(node.entry);
     if (is_searched(g->c, below))
         return EBPO_OK;
+    /* Few of many subtrees have the result, so the source index of its face is read later. */
+    bool many = g->c->envelope_count && g->n->found;
+    atomic_fetch_add(&g->c->model->without_maps, many);
     hint_subtrees(g, below, r->lower);
     g->c->marks[below] = 2 * g->c->query_number + 1;
     g->c->searched++;
@@ -389,6 +390,7 @@ static ebpo_status search_below(searching *g, const ebpo_ranked *r, ebpo_error *
     uint64_t loaded = g->c->loaded;
     double limit = g->n->limit;
     ebpo_status status = ebpo_model_enter(g->c, &node, error);
+    atomic_fetch_sub(&g->c->model->without_maps, many);
     if (status != EBPO_OK)
         return status;
     ebpo_nearest_search(g->n, g->c, node.subtree);
@@ -540,69 +542,32 @@ static bool add_owners(searching *g, const ebpo_skeleton *k, const ebpo_ranked *
 
 static double deep_bound(const searching *g, const ebpo_ranked *r)
 {
-    return bound_below_cut(&g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n), NULL);
+    return bound_below_cut(g->c, &g->ranking, &r->node, r->lower, ebpo_nearest_limit(g->n), NULL);
 }
 
-/* Returns the number of levels of deep bounds that this search should read. The levels have less
- * than a quarter of the bytes of all subtrees that the search may have to load without them. (With
- * deep bounds, the search loads about a third of these subtrees.) Counts no levels whose chunks
- * could not be located. */
-static int paying_levels(const searching *g)
-{
-    const ebpo_model *m = g->c->model;
-    unsigned subtrees = list_needed(g, g->n->limit, UINT32_MAX).count;
-    double subtree_bytes = (double)m->file->in.source.size / (double)m->top->below_count;
-    double left = 0.25 * subtree_bytes * (double)subtrees;
-    int levels = 0, most = deep_level(m, DEEP_LEVELS_REMOTE) - m->top->cut_level;
-    while (levels < most) {
-        ebpo_hints next = EBPO_HINTS_INIT(m->file);
-        ebpo_hint_level(&next, m->top->cut_level + levels + 1, EBPO_PART_MESH);
-        bool known = !next.failed;
-        left -= (double)ebpo_hints_bytes(&next);
-        if (!known || left <= 0)
-            break;
-        levels++;
-    }
-    return levels;
-}
-
-/* Lowers the limit of the search by the cells of deep bounds, so that few subtrees are within it
- * before a face is found. */
-static void limit_by_cells(searching *g)
-{
-    uint64_t near[EBPO_CACHE_AHEAD];
-    ebpo_nearest *n = g->n;
-    unsigned count = ebpo_subtrees_near(g->c->model, n->p, n->limit, near);
-    for (unsigned i = 0; i < count; i++) {
-        ebpo_node node = node_below(g->c->model, (uint32_t)near[i]);
-        bound_below_cut(&g->ranking, &node, 0, n->limit, &n->upper);
-        n->limit = fmin(n->limit, n->upper);
-    }
-    g->limited = true;
-}
-
-/* For a remote file, reads deep bounds as soon as they pay: after a face is found, or before it if
- * the point is so far from all faces that the first face will exclude few subtrees (it lowers the
- * limit by at most 40 %). `lower`: bound of all faces that were not searched. If the source of
- * bytes returns EBPO_E_PENDING, this point and all later points of the batch that need deep bounds
- * wait for the next call; only the first of them requests the bytes. A query with a deadline does
- * not read them, because the read could take longer. */
+/* For a remote file: if many new subtrees may have the nearest face, reads the envelopes of the
+ * first levels of the nearest of them, and lowers the limit of the search by the cells of these
+ * levels. Envelopes are read after a face is found, or before it if the point is so far from all
+ * faces that the first face will exclude few subtrees (it lowers the limit by at most 40 %).
+ * `lower`: bound of all faces that were not searched. A query with a deadline does not read
+ * envelopes, because the read could take longer. */
 static ebpo_status improve_bounds(searching *g, double lower, ebpo_error *error)
 {
-    ebpo_model *m = g->c->model;
-    ebpo_status status = EBPO_OK;
-    if (g->ranking.far || g->n->deadline || !ebpo_input_prefetches(&m->file->in))
+    ebpo_nearest *n = g->n;
+    if (g->full || g->ranking.far || n->deadline || !(n->found || lower > 0.6 * n->limit) ||
+        !ebpo_model_has_envelopes(g->c->model))
         return EBPO_OK;
-    bool wanted = !m->deep_begun && m->skeletons && (g->n->found || lower > 0.6 * g->n->limit);
-    int levels = wanted ? paying_levels(g) : 0;
-    if (levels && g->c->deep_pending) /* the batch keeps the error of its first pending point */
-        return EBPO_E_PENDING;
-    if (levels) {
-        status = ebpo_deep_bounds_make(m, levels, error);
-        g->c->deep_pending = status == EBPO_E_PENDING;
+    needed list = list_needed(g, n->limit, UINT32_MAX, true);
+    if (list.count < ENVELOPES_LEAST)
+        return EBPO_OK;
+    unsigned before = g->c->envelope_count;
+    ebpo_status status = ebpo_context_read_envelopes(g->c, list.below, list.count, error);
+    g->full = g->c->envelope_count - before < list.count;
+    for (unsigned i = 0; i < list.count && status == EBPO_OK; i++) {
+        ebpo_node node = node_below(g->c->model, list.below[i]);
+        bound_below_cut(g->c, &g->ranking, &node, 0, n->limit, &n->upper);
+        n->limit = fmin(n->limit, n->upper);
     }
-    if (status == EBPO_OK && m->deep && !g->limited)
-        limit_by_cells(g);
     return status;
 }
 
@@ -680,6 +645,7 @@ static ebpo_status search_parts(searching *g, ebpo_error *error)
                                                         : inspect_subtree(g, &next, error);
     }
     ebpo_deep_bounds_report(g->c->model, g->new_loads);
+    ebpo_context_drop_envelopes(g->c);
     return status;
 }
 

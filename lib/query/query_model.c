@@ -174,16 +174,17 @@ static ebpo_status estimate_subtree(void *user, uint64_t key, uint64_t *peak, ui
     ebpo_model *m = user;
     ebpo_slice_size size;
     uint32_t below = ebpo_subtree_of_key(key), needs = ebpo_subtree_needs(ebpo_content_of_key(key));
+    uint32_t hinted = needs | (m->without_maps ? 0 : EBPO_NEEDS_MAPS);
     const ebpo_node *root = &m->top->below[below];
     bool is_of_file = root->type == EBPO_GRAY && root->cell.level == m->info->subtree_level;
     if (!is_of_file)
-        ebpo_top_hint(m->top, m->chunks, &below, 1, needs | EBPO_NEEDS_MAPS);
+        ebpo_top_hint(m->top, m->chunks, &below, 1, hinted, EBPO_LEVELS_MAX);
     ebpo_status status =
         ebpo_slice_measure_nodes(m->chunks, root, needs, EBPO_SLICE_ALL, &size, error);
     if (status != EBPO_OK)
         return status;
     if (is_of_file)
-        ebpo_top_hint(m->top, m->chunks, &below, 1, needs | EBPO_NEEDS_MAPS);
+        ebpo_top_hint(m->top, m->chunks, &below, 1, hinted, EBPO_LEVELS_MAX);
     ebpo_accel_estimate_subtree(&size, m->info, keep, peak);
     return EBPO_OK;
 }
@@ -577,6 +578,7 @@ void ebpo_context_free(ebpo_context *c)
     free(c->unsorted_hits);
     free(c->queue);
     free(c->marks);
+    free(c->envelopes_of);
     free(c->faces);
     kept_envelopes_free(c->envelopes);
     free(c->cutting);

@@ -33,12 +33,14 @@ struct ebpo_model {
     bool results_inside; /* true: the whole model is in memory with its mesh, and has an inside */
     ebpo_holes *holes;   /* for a surface with its border (the edges of its holes); or NULL */
     /* If the model is loaded in parts: */
-    ebpo_top *top;              /* levels 0 .. cut level */
-    ebpo_chunks *chunks;        /* decoded chunks */
-    ebpo_cache *cache;          /* loaded subtrees, by ebpo_subtree_key */
-    ebpo_skeletons *skeletons;  /* skeletons (upper nodes of the hierarchies over faces) of subtrees
-                                 * that were loaded at least once; or NULL */
-    _Atomic(ebpo_top *) deep;   /* deep bounds (nearest.h), or NULL */
+    ebpo_top *top;             /* levels 0 .. cut level */
+    ebpo_chunks *chunks;       /* decoded chunks */
+    ebpo_cache *cache;         /* loaded subtrees, by ebpo_subtree_key */
+    ebpo_skeletons *skeletons; /* skeletons (upper nodes of the hierarchies over faces) of subtrees
+                                * that were loaded at least once; or NULL */
+    _Atomic(ebpo_top *) deep;  /* deep bounds (nearest.h), or NULL */
+    /* number of running queries that read source indices of faces for their results only */
+    _Atomic unsigned without_maps;
     atomic_bool deep_begun;     /* a thread has begun to read deep bounds */
     _Atomic uint64_t new_loads; /* number of loaded subtrees that had no skeleton before; counted
                                  * until `deep` is set */
@@ -82,7 +84,9 @@ struct ebpo_context {
     uint32_t query_number; /* of the current query */
     /* numbers of subtrees that distance queries searched, and that all queries loaded */
     uint64_t searched, loaded;
-    bool deep_pending; /* in this pass over a batch, bytes of deep bounds were not available yet */
+    ebpo_top **envelopes_of; /* [subtrees] envelopes of the first levels of some subtrees, read for
+                              * the current query; NULL before the first use (load_ahead.h) */
+    unsigned envelope_count; /* number of these subtrees */
     ebpo_kept_envelopes *envelopes; /* envelopes for distances to them; or NULL */
     ebpo_polytope *cutting;         /* [2] temporary envelopes, which are too large for a small
                                      * stack; NULL before the first use */

@@ -204,6 +204,20 @@ static void shrink_all(reading *r)
     shrink_array(&t->below_planes, &r->below_planes_capacity, r->below, sizeof *t->below_planes);
 }
 
+/* Sets the counts and the bytes of a completely read top. */
+static void end_top(reading *r)
+{
+    ebpo_top *t = r->top;
+    if (r->envelopes)
+        shrink_all(r);
+    t->nodes.group_count = (uint32_t)r->group;
+    t->below_count = r->below;
+    t->bytes = sizeof *t + r->group_capacity * sizeof *t->nodes.group +
+               r->gray_capacity * sizeof *t->gray + r->plane_capacity * 4 +
+               r->below_capacity * sizeof *t->below +
+               r->below_planes_capacity * sizeof *t->below_planes;
+}
+
 /* Sends prefetch hints for levels 0 to `last`, without the arrays of omitted parts. */
 static void hint_levels(const ebpo_file *file, int last, uint32_t omitted_parts)
 {
@@ -248,14 +262,7 @@ static ebpo_status read_top(ebpo_top **out, const ebpo_file *file, int cut_level
         ebpo_top_free(top);
         return status;
     }
-    if (envelopes)
-        shrink_all(&r);
-    top->nodes.group_count = (uint32_t)r.group;
-    top->below_count = r.below;
-    top->bytes = sizeof *top + r.group_capacity * sizeof *top->nodes.group +
-                 r.gray_capacity * sizeof *top->gray + r.plane_capacity * 4 +
-                 r.below_capacity * sizeof *top->below +
-                 r.below_planes_capacity * sizeof *top->below_planes;
+    end_top(&r);
     *out = top;
     return EBPO_OK;
 }
@@ -270,6 +277,36 @@ ebpo_status ebpo_top_read_envelopes(ebpo_top **out, const ebpo_file *file, int c
                                     unsigned threads, ebpo_error *error)
 {
     return read_top(out, file, cut_level, threads, true, error);
+}
+
+ebpo_status ebpo_top_read_subtree(ebpo_top **out, ebpo_chunks *chunks, const ebpo_node *root,
+                                  ebpo_error *error)
+{
+    ebpo_slice slice;
+    *out = NULL;
+    ebpo_status status =
+        ebpo_slice_read_nodes(&slice, chunks, root, EBPO_TOP_ENVELOPES, EBPO_DEEP_LEVELS, error);
+    if (status != EBPO_OK)
+        return status;
+    ebpo_top *top = ebpo_alloc_zero(1, sizeof *top);
+    reading r = {
+        .top = top, .info = ebpo_file_info(chunks->file), .envelopes = true, .error = error
+    };
+    if (!top)
+        status = ebpo_fail_memory(error, sizeof *top);
+    else
+        top->cut_level = slice.level_count - 1;
+    for (int i = 0; i < slice.level_count && status == EBPO_OK; i++)
+        status = add_level(&r, i, &slice.level[i], r.group - (i ? slice.level[i].group_count : 0));
+    free(r.gray);
+    ebpo_slice_free(&slice);
+    if (status != EBPO_OK) {
+        ebpo_top_free(top);
+        return status;
+    }
+    end_top(&r);
+    *out = top;
+    return EBPO_OK;
 }
 
 void ebpo_top_free(ebpo_top *top)

@@ -53,6 +53,9 @@ typedef struct ray_rounds {
     uint8_t *state; /* [top->below_count] */
     uint32_t missing[MISSING_MAX];
     unsigned missing_count;
+    bool lacks_maps;    /* rays wait for chunks with the source indices of their hits */
+    uint64_t map_chunk; /* number of the last of these chunks */
+    ebpo_hints maps;    /* these chunks */
 } ray_rounds;
 
 /* A query with one ray. */
@@ -721,15 +724,35 @@ static ebpo_status store_miss(batch *b, uint64_t i, unsigned worker, ebpo_error 
     return store_result(b, i, worker, &none, error);
 }
 
+/* Adds to r->maps the chunks with the source indices of the ray's hits, unless they are in memory.
+ * Returns true if there are such chunks. */
+static bool lacks_maps(const casting *c, ray_rounds *r)
+{
+    const ebpo_ray_found *hit = c->wants == EBPO_WANTS_FIRST ? &c->first : *c->found;
+    bool lacks = false;
+    for (uint64_t i = 0; i < c->count && c->wants != EBPO_WANTS_ANY; i++) {
+        uint64_t face = hit[i].file_face, chunk = face / EBPO_FACE_BLOCK;
+        if ((r->lacks_maps && chunk == r->map_chunk) ||
+            ebpo_chunks_hint(c->context->model->chunks, &r->maps, EBPO_A_FACE_SOURCE, 0, face, 1)) {
+            r->map_chunk = chunk;
+            lacks = r->lacks_maps = true;
+        }
+    }
+    return lacks;
+}
+
 /* Evaluates ray i, and stores its result. In a round (rounds is not NULL), *waits is set to true if
- * the ray must go on in the next round; then it has no result. */
+ * the ray must go on in the next round; then it has no result. *hinted: the round before has
+ * requested the source indices of the ray's hits; set to true if this round will do so. */
 static ebpo_status cast_one(batch *b, uint64_t i, unsigned worker, ray_rounds *rounds, bool *waits,
-                            ebpo_error *error)
+                            bool *hinted, ebpo_error *error)
 {
     casting c;
     begin_ray(b, i, worker, &c);
     c.rounds = rounds;
     ebpo_status status = ray_walk(&c, error);
+    if (status == EBPO_OK && rounds && !c.waits && !*hinted)
+        c.waits = *hinted = lacks_maps(&c, rounds);
     *waits = c.waits;
     return status == EBPO_OK && !c.waits ? store_result(b, i, worker, &c, error) : status;
 }
@@ -919,11 +942,14 @@ static ebpo_status cast_in_order(batch *b, uint64_t begin, uint64_t end, unsigne
         uint64_t k = begin + i, ray = b->order ? b->order[k] : k;
         if (b->options.done && b->options.done[ray])
             continue;
-        status = cast_one(b, ray, worker, NULL, &waits, error);
+        status = cast_one(b, ray, worker, NULL, &waits, NULL, error);
         status = ebpo_batch_note(&along, i, k, status, error);
     }
     return ebpo_batch_end(&along, status, error);
 }
+
+/* Bit of waiting.ray: the source indices of the ray's hits were requested. */
+#define MAPS_HINTED (UINT64_C(1) << 63)
 
 /* The rays of a range that have no result yet, in the order of work. */
 typedef struct waiting {
@@ -935,14 +961,17 @@ typedef struct waiting {
     ebpo_error error;
 } waiting;
 
-/* Requests the missing subtrees. Returns false if there are none. Also returns false if there are
- * too many together with those whose bytes are not available yet. */
+/* Requests the missing subtrees and source indices. Returns false if there are none. Also returns
+ * false if there are too many subtrees together with those whose bytes are not available yet. */
 static bool request_missing(waiting *w, const ebpo_context *c)
 {
     ray_rounds *r = &w->rounds;
     unsigned count = r->missing_count;
+    bool any = count || r->lacks_maps;
     w->requested += count;
-    if (count == 0 || (w->pending && w->requested > MISSING_MAX))
+    ebpo_hint_all(&r->maps);
+    r->lacks_maps = false;
+    if (!any || (w->pending && w->requested > MISSING_MAX))
         return false;
     for (unsigned i = 0; i < count; i++)
         r->state[r->missing[i]] = SUBTREE_REQUESTED;
@@ -957,15 +986,16 @@ static ebpo_status cast_round(batch *b, waiting *w, unsigned worker, ebpo_error 
     ebpo_status status = EBPO_OK;
     uint64_t kept = 0;
     for (uint64_t i = 0; i < w->count && status == EBPO_OK; i++) {
-        bool waits;
-        status = cast_one(b, w->ray[i], worker, &w->rounds, &waits, error);
+        uint64_t ray = w->ray[i] & ~MAPS_HINTED;
+        bool waits, hinted = w->ray[i] & MAPS_HINTED;
+        status = cast_one(b, ray, worker, &w->rounds, &waits, &hinted, error);
         if (status == EBPO_E_PENDING) {
             if (!w->pending)
                 w->error = error ? *error : (ebpo_error){ .status = status, .offset = -1 };
             w->pending = true;
             status = EBPO_OK;
         } else if (waits) {
-            w->ray[kept++] = w->ray[i];
+            w->ray[kept++] = ray | (hinted ? MAPS_HINTED : 0);
         }
     }
     w->count = kept;
@@ -974,12 +1004,13 @@ static ebpo_status cast_round(batch *b, waiting *w, unsigned worker, ebpo_error 
 
 /* Evaluates the rays begin .. end - 1 of a remote file in rounds. In each round, a ray goes on
  * until it needs a subtree that is neither in memory nor requested. Then one round trip fetches the
- * subtrees that all rays need next. */
+ * subtrees that all rays need next, and the source indices of the faces that rays hit. (With the
+ * source indices of whole subtrees, 100 rays fetch 9 % more bytes.) */
 static ebpo_status cast_in_rounds(batch *b, uint64_t begin, uint64_t end, unsigned worker,
                                   ebpo_error *error)
 {
     ebpo_context *c = b->context[worker];
-    waiting w = { .count = 0 };
+    waiting w = { .rounds.maps = EBPO_HINTS_INIT(c->model->file) };
     uint64_t subtrees = c->model->top->below_count;
     w.ray = ebpo_alloc(end - begin, sizeof *w.ray);
     w.rounds.state = ebpo_alloc_zero(subtrees, 1);
@@ -991,9 +1022,12 @@ static ebpo_status cast_in_rounds(batch *b, uint64_t begin, uint64_t end, unsign
         if (!b->options.done || !b->options.done[ray])
             w.ray[w.count++] = ray;
     }
+    atomic_fetch_add(&c->model->without_maps, 1);
     do
         status = status == EBPO_OK ? cast_round(b, &w, worker, error) : status;
     while (status == EBPO_OK && request_missing(&w, c));
+    atomic_fetch_sub(&c->model->without_maps, 1);
+    free(w.rounds.maps.range);
     free(w.ray);
     free(w.rounds.state);
     return status == EBPO_OK && w.pending ? ebpo_fail_with(error, &w.error) : status;

@@ -128,7 +128,7 @@ static uint64_t sort_rows(uint64_t *rows, uint64_t count)
 }
 
 void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *below, uint64_t count,
-                   uint32_t needs)
+                   uint32_t needs, int last_level)
 {
     const ebpo_info *info = &chunks->file->info;
     ebpo_hints hints = EBPO_HINTS_INIT(chunks->file);
@@ -156,7 +156,7 @@ void ebpo_top_hint(const ebpo_top *top, ebpo_chunks *chunks, const uint32_t *bel
     }
     ebpo_hint_all(&hints); /* in most files, the levels of lone leaves are already here */
     for (uint64_t i = 0; i < found; i++)
-        ebpo_subtrees_hint(chunks, &hints, rows[i], 1, needs, EBPO_LEVELS_MAX, true);
+        ebpo_subtrees_hint(chunks, &hints, rows[i], 1, needs, last_level, needs & EBPO_NEEDS_MESH);
     for (uint64_t i = 0; i < leaves && hint_lone_leaf(top, chunks, &leaf[i], needs, &hints); i++)
         ;
     ebpo_hint_all(&hints);

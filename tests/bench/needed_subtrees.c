@@ -115,7 +115,7 @@ static void request_all(const char *url, const ebpo_model_options *how, const bo
         if (needed[i])
             below[count++] = i;
     ebpo_top_hint(m->top, m->chunks, below, count,
-                  ebpo_subtree_needs(EBPO_ACCEL_NODES) | EBPO_NEEDS_MAPS);
+                  ebpo_subtree_needs(EBPO_ACCEL_NODES) | EBPO_NEEDS_MAPS, EBPO_LEVELS_MAX);
     for (uint64_t i = 0; i < count; i++) {
         ebpo_accel *subtree;
         check(ebpo_context_subtree(c, below[i], &subtree, &error));

@@ -228,7 +228,7 @@ START_TEST(test_results_do_not_depend_on_skeletons)
     how.memory = _i & 1 ? (UINT64_C(9) << 19) + (uint64_t)_i % 4 * 30000 : 0;
     begin(&s, _i / 2, _i / 2 % query_variant_count, &how, 0);
     if (_i / 2 % 2)
-        ck_assert(ebpo_deep_bounds_make(s.model, 2, NULL) == EBPO_OK);
+        ebpo_deep_bounds_make(s.model);
     ck_assert(!s.model->deep || s.model->deep->cut_level > how.cut_level);
     uint64_t all = s.count;
     s.count = all / 8;
@@ -279,7 +279,7 @@ static uint64_t searched_at_first(int solid, int cut_level, bool deep)
     begin(&s, solid, 5, &how, 20);
     uint64_t before = ebpo_skeletons_bytes(s.model->skeletons);
     if (deep) {
-        ck_assert(ebpo_deep_bounds_make(s.model, 2, NULL) == EBPO_OK);
+        ebpo_deep_bounds_make(s.model);
         ck_assert_ptr_nonnull(s.model->deep);
         ck_assert_uint_eq(ebpo_skeletons_bytes(s.model->skeletons), before + s.model->deep->bytes);
         ck_assert_uint_le(s.model->deep->bytes,
@@ -310,7 +310,7 @@ static uint64_t searched_in_new(const query_model *m, const double p[3], bool de
     ASSERT_OK(ebpo_model_new(m->file, &how, &model, error));
     ASSERT_OK(ebpo_context_new(model, &context, error));
     if (deep)
-        ASSERT_OK(ebpo_deep_bounds_make(model, 2, error));
+        ebpo_deep_bounds_make(model);
     ASSERT_OK(ebpo_distance(context, p, NULL, &parts, error));
     ASSERT_OK(ebpo_distance(m->context, p, NULL, &whole, error));
     ck_assert_mem_eq(&parts, &whole, sizeof parts);

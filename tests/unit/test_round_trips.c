@@ -178,35 +178,41 @@ static void free_large(void)
 /* A query that needs many subtrees requests several of them together. */
 START_TEST(test_remote_deep_query_round_trips)
 {
-    enum { WAVES = 3 }; /* 23 when each subtree is requested alone, 8 without limit_by_cells */
+    enum {
+        WAVES = 3,     /* 23 when each subtree is requested alone, 9 without envelopes */
+        BYTES = 910000 /* 923,000 with all source indices, 1,047,000 without envelopes */
+    };
     static const double p[3] = { 2.1, 0.1, 0.05 };
     counted_source c;
     ebpo_file *far = counted_open(&c, l.packed, true);
     result a = run_query(far, &c, p, false, -1), b = run_query(l.without, NULL, p, false, -1);
     counted_close(&c, far);
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
-    ck_assert_msg(c.requested < c.size / 3, "%d of %d bytes", (int)c.requested, (int)c.size);
+    ck_assert_msg(c.requested < BYTES, "%d of %d bytes", (int)c.requested, (int)c.size);
     ck_assert(a.distance == b.distance);
 }
 END_TEST
 
-/* A query at almost equal distances from many subtrees reads deep bounds, and then few subtrees. */
+/* A query at almost equal distances from many subtrees reads their envelopes, then few subtrees. */
 START_TEST(test_remote_axis_query_bytes)
 {
-    enum { WAVES = 3 }; /* 26 without deep bounds, 10 without limit_by_cells */
+    enum {
+        WAVES = 3,     /* 10 without envelopes */
+        BYTES = 412000 /* 415,000 with all source indices, 790,000 without envelopes */
+    };
     static const double p[3] = { 0.05, 0.02, 0.01 };
     counted_source c;
     ebpo_file *far = counted_open(&c, l.packed, true);
     result a = run_query(far, &c, p, false, -1), b = run_query(l.without, NULL, p, false, -1);
     counted_close(&c, far);
     ck_assert_msg(a.waves <= WAVES, "%d waves", (int)a.waves);
-    ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
+    ck_assert_msg(c.requested < BYTES, "%d of %d bytes", (int)c.requested, (int)c.size);
     ck_assert(a.distance == b.distance);
 }
 END_TEST
 
-/* Returns true if a cold distance query of a remote file reads deep bounds. */
-static bool reads_deep_bounds(uint64_t deadline_ns)
+/* Returns true if a cold distance query of a remote file reads envelopes. */
+static bool reads_envelopes(uint64_t deadline_ns)
 {
     static const double p[3] = { 0.05, 0.02, 0.01 };
     counted_source c;
@@ -222,20 +228,19 @@ static bool reads_deep_bounds(uint64_t deadline_ns)
     ck_assert(ebpo_model_new(far, &options, &model, NULL) == EBPO_OK);
     ck_assert(ebpo_context_new(model, &context, NULL) == EBPO_OK);
     ck_assert(ebpo_distance(context, p, &how, &distance, NULL) == EBPO_OK);
-    bool begun = model->deep_begun;
+    bool read = context->envelopes_of != NULL;
     ebpo_context_free(context);
     ebpo_model_free(model);
     counted_close(&c, far);
-    return begun;
+    return read;
 }
 
-/* A query with a deadline does not begin to read deep bounds, because it could not stop the read.
- */
-START_TEST(test_deadline_reads_no_deep_bounds)
+/* A query with a deadline does not begin to read envelopes, because it could not stop the read. */
+START_TEST(test_deadline_reads_no_envelopes)
 {
     const uint64_t hour = UINT64_C(3600000000000);
-    ck_assert(reads_deep_bounds(0));
-    ck_assert(!reads_deep_bounds(hour));
+    ck_assert(reads_envelopes(0));
+    ck_assert(!reads_envelopes(hour));
 }
 END_TEST
 
@@ -264,10 +269,13 @@ static void cast_rays(const ebpo_file *file, ebpo_ray_hit hit[RAYS])
 }
 
 /* The subtrees that all rays need next are requested together; a subtree whose envelope the rays
- * miss is not requested. */
+ * miss is not requested. Source indices are requested for the hits only. */
 START_TEST(test_remote_rays_round_trips)
 {
-    enum { WAVES = 4 }; /* 55 when each ray requests its subtrees alone */
+    enum {
+        WAVES = 5,      /* 55 when each ray requests its subtrees alone */
+        BYTES = 1600000 /* 1,614,000 with all source indices */
+    };
     counted_source c;
     ebpo_ray_hit a[RAYS], b[RAYS];
     ebpo_file *far = counted_open(&c, l.packed, true);
@@ -277,7 +285,7 @@ START_TEST(test_remote_rays_round_trips)
     opened = c.batches + c.alone - opened;
     counted_close(&c, far);
     ck_assert_msg(opened <= WAVES, "%d waves", (int)opened);
-    ck_assert_msg(c.requested < c.size / 2, "%d of %d bytes", (int)c.requested, (int)c.size);
+    ck_assert_msg(c.requested < BYTES, "%d of %d bytes", (int)c.requested, (int)c.size);
     for (int i = 0; i < RAYS; i++)
         ck_assert(a[i].t == b[i].t && a[i].face == b[i].face && a[i].side == b[i].side);
 }
@@ -478,7 +486,7 @@ TEST_SUITE(round_trips)
     tcase_add_unchecked_fixture(large, make_large, free_large);
     tcase_add_test(large, test_remote_deep_query_round_trips);
     tcase_add_test(large, test_remote_axis_query_bytes);
-    tcase_add_test(large, test_deadline_reads_no_deep_bounds);
+    tcase_add_test(large, test_deadline_reads_no_envelopes);
     tcase_add_test(large, test_remote_rays_round_trips);
     tcase_add_test(large, test_remote_radius_query_round_trips);
     tcase_add_test(large, test_remote_box_query_round_trips);
