@@ -330,8 +330,7 @@ START_TEST(test_cache_pinned_items_stay)
 }
 END_TEST
 
-/* Items are evicted for a reservation, except items in use. A load that would need the reserved
- * memory is refused before memory is taken. */
+/* Small items stay while large items can be dropped, up to half of the budget. */
 START_TEST(test_cache_keeps_small_items_longer)
 {
     begin_with(16 << 10, 4 << 10, 4 << 10);
@@ -355,6 +354,8 @@ START_TEST(test_cache_keeps_small_items_longer)
 }
 END_TEST
 
+/* Items are evicted for a reservation, except items in use. A load that would need the reserved
+ * memory is refused before memory is taken. */
 START_TEST(test_cache_reserve_evicts_items_when_needed)
 {
     begin_with(400, 100, 100);
