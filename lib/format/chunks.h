@@ -87,9 +87,9 @@ EBPO_MUST_USE ebpo_status ebpo_chunks_take(ebpo_chunks *chunks, ebpo_array_id id
                                            void *values_out, ebpo_error *error);
 
 /* Adds to `hints` the chunks that are not in memory and contain existing rows of
- * [row, row + rows). Returns true if there are such chunks. Does nothing for a counted cache, whose
- * callers prefetch with ebpo_chunks_missing and ebpo_chunks_fetch. If chunks are being collected
- * (ebpo_chunks_collect), adds these chunks to the collected keys. */
+ * [row, row + rows). Returns true if chunks were added. Adds nothing to `hints` for a counted
+ * cache, whose callers prefetch with ebpo_chunks_missing and ebpo_chunks_fetch. If chunks are being
+ * collected (ebpo_chunks_collect), adds these chunks to the collected keys. */
 bool ebpo_chunks_hint(ebpo_chunks *chunks, ebpo_hints *hints, ebpo_array_id id, int level,
                       uint64_t row, uint64_t rows);
 

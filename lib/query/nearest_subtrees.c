@@ -231,7 +231,7 @@ typedef struct searching {
     ebpo_ranking ranking;
     unsigned new_loads; /* number of new subtrees that this search loaded */
     double hinted;      /* prefetch hints were sent for all new subtrees up to this bound */
-    bool full;          /* the quota for envelopes is used up */
+    bool improved; /* no more envelopes are read: few subtrees lack them, or the quota is used up */
 } searching;
 
 /* Adds a node to the queue if its bound is within the limit. */
@@ -554,15 +554,16 @@ static double deep_bound(const searching *g, const ebpo_ranked *r)
 static ebpo_status improve_bounds(searching *g, double lower, ebpo_error *error)
 {
     ebpo_nearest *n = g->n;
-    if (g->full || g->ranking.far || n->deadline || !(n->found || lower > 0.6 * n->limit) ||
+    if (g->improved || g->ranking.far || n->deadline || !(n->found || lower > 0.6 * n->limit) ||
         !ebpo_model_has_envelopes(g->c->model))
         return EBPO_OK;
     needed list = list_needed(g, n->limit, UINT32_MAX, true);
-    if (list.count < ENVELOPES_LEAST)
+    g->improved = list.count < ENVELOPES_LEAST; /* a later list has only subtrees of this list */
+    if (g->improved)
         return EBPO_OK;
     unsigned before = g->c->envelope_count;
     ebpo_status status = ebpo_context_read_envelopes(g->c, list.below, list.count, error);
-    g->full = g->c->envelope_count - before < list.count;
+    g->improved = g->c->envelope_count - before < list.count;
     for (unsigned i = 0; i < list.count && status == EBPO_OK; i++) {
         ebpo_node node = node_below(g->c->model, list.below[i]);
         bound_below_cut(g->c, &g->ranking, &node, 0, n->limit, &n->upper);

@@ -72,7 +72,8 @@ typedef struct ebpo_model_options {
      *
      * Not included are the chunk directory of the file and its checksums (28 bytes per chunk),
      * decoders (about 250 kB per loading thread) and contexts. A context contains results; for
-     * distances, it also contains 4 bytes per subtree below the cut level, and a queue of nodes.
+     * distances, it also contains 4 bytes (for a remote file, 12) per subtree below the cut level,
+     * and a queue of nodes.
      */
     uint64_t memory;
 
