@@ -9,7 +9,6 @@ its .json and .nodes.json. Checks the content checksum.
 """
 import hashlib
 import json
-import math
 import pathlib
 import sys
 
@@ -788,7 +787,7 @@ def patch_point(points, v, step, of):
     out = [(x + d + 32768) % 65536 - 32768 for x, d in zip(guess, step)]
     if n[k]:
         rise = sum(n[i] * (out[i] - guess[i]) for i in range(3) if i != k)
-        out[k] = (guess[k] - math.floor(rise / n[k] + .5) + step[k] + 32768) % 65536 - 32768
+        out[k] = (guess[k] - (2 * rise + n[k]) // (2 * n[k]) + step[k] + 32768) % 65536 - 32768
     return out
 
 

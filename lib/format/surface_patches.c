@@ -207,7 +207,8 @@ static predicted_point predict_point(const int16_t *point, const prediction *p, 
 
 /* Returns the predicted coordinate i of `point`, whose coordinates except p->steep are known. On
  * the axis p->steep, the plane of the triangle at these coordinates is the prediction. All numbers
- * are integers below 2^53, so only the division rounds. */
+ * are integers below 2^53, so only the division and the last sum round; quotients are below 2^18
+ * and divisors below 2^33, so this does not change the result. */
 static int32_t predict_coordinate(const predicted_point *p, int i, const int16_t point[3])
 {
     const double *n = p->normal;

@@ -449,7 +449,7 @@ static ebpo_status compress_gates(window_chunk *s, ebpo_chunk_coder *coder, int 
                                      EBPO_GATES_ENDS, s->stored, &s->stored_bytes);
 }
 
-/* Compression level of simplified surfaces: high, because they are small and are sent over networks
+/* Default zstd level of simplified surfaces: high, because they are small and sent over networks.
  */
 enum { LEVEL_OF_SURFACES = 16 };
 

@@ -536,9 +536,9 @@ typedef struct ebpo_write_options {
     ebpo_codec codec;
 
     /*
-     * Compression level. 0: the default. For deflate, the default is 6. For zstd, it is 3 for
-     * chunks of less than 4 KiB; for larger chunks, it is 7 with a minimum match length of six
-     * bytes.
+     * Compression level. 0: the default. For deflate, the default is 6. For zstd, it is 16 for
+     * simplified surfaces, and 3 for other chunks of less than 4 KiB; for larger chunks, it is 7
+     * with a minimum match length of six bytes.
      */
     int codec_level;
 
