@@ -159,13 +159,14 @@ put("import", "mtl", bytes([4]) + mtl)
 put("import", "ply_names", bytes([4]) + b"ply\ncomment TextureFile a b.png\ncomment TextureFile ../x.png\nend_header\n")
 
 # --- surfaces: vertices less 3 and triangles less 1 of two patches; octant, colours; share of the codes ---
-strip = bytes([0xf0, 0, 0, 0]) + bytes([0, 1, 0x0f, 3, 0x10, 2, 0xf0, 1, 2, 0, 0x22])
+# Codes by triangles less 1: bytes of open edges, then numbers, backwards.
+codes = {0: bytes(3), 3: bytes([0, 3, 0, 4, 2, 0, 0, 0]), 7: bytes([0, 0, 1, 0, 0, 2, 0, 0, 0, 0])}
 for flags in (0, 7, 8, 15):
     for vertices, triangles in ((0, 0), (5, 7), (40, 7), (200, 3)):
         points = b"".join(struct.pack("<3H", i * 2 % 301, i * 14 % 999, i * 34 % 47) for i in range(2 * vertices + 6))
         rest = bytes(i * 31 % 256 for i in range((2 if flags < 8 else 5) * (2 * vertices + 6)))
         put("surface", f"{flags}_{vertices}_{triangles}",
-            bytes([vertices, vertices, triangles, triangles, flags, 128]) + points + rest + strip[:4 + triangles * 2] * 2)
+            bytes([vertices, vertices, triangles, triangles, flags, 128]) + points + rest + codes[triangles] * 2)
 
 # --- heads: indexes of chunks in pages, and what lies beyond the first bytes that are read ---
 (folder / "head").mkdir(parents=True, exist_ok=True)

@@ -173,13 +173,18 @@ class Parts(Case):
                                          ["--parts", "mesh,attributes,colours,leaf-planes"]),
                                         ("open_box", {"fill_holes": True}, ["--fill-holes"]),
                                         ("coloured", {"unit": "mm", "codec": "deflate"},
-                                         ["--unit", "mm", "--codec", "deflate"])):
+                                         ["--unit", "mm", "--codec", "deflate"]),
+                                        ("coloured", {"parts": "-maps,+surface"}, ["--parts=-maps,+surface"]),
+                                        ("coloured", {"parts": ["-mesh"]}, ["--parts=-mesh"])):
             subprocess.run([COMMAND, "convert", "-q", *switches, f"{name}.ply", "by_command.ebpo.h5"], check=True)
             ebpo.convert(f"{name}.ply", "by_python.ebpo.h5", overwrite=True, **options)
             self.assertEqual(pathlib.Path("by_python.ebpo.h5").read_bytes(),
                              pathlib.Path("by_command.ebpo.h5").read_bytes(), name)
         mesh = model("scan").mesh(order="source")
         self.assertEqual(ebpo.convert(mesh, "dated.ebpo.h5", date="2026-03-01").info.face_count, len(mesh.faces))
+        for wrong in ("-mesh,+surface", "mesh,+surface", "envelopes,maps", "-none", ""):
+            with self.assertRaisesRegex(ValueError, "^parts: "):
+                ebpo.convert(mesh, "never.ebpo.h5", parts=wrong)
         with self.assertRaisesRegex(ValueError, "2026-02-30"):
             ebpo.convert(mesh, "never.ebpo.h5", date="2026-02-30")
         made = ebpo.convert(mesh, "arrays.ebpo.h5")

@@ -24,7 +24,7 @@ PARTS = {"mesh": c.EBPO_PART_MESH, "maps": c.EBPO_PART_MAPS, "attributes": c.EBP
          "envelopes": c.EBPO_PART_PLANES, "leaf-planes": c.EBPO_PART_LEAF_PLANES, "colours": c.EBPO_PART_COLOURS,
          "border": c.EBPO_PART_BORDER, "surface": c.EBPO_PART_SURFACE}
 DEFAULT_PARTS = sum(PARTS.values()) & ~(c.EBPO_PART_LEAF_PLANES | c.EBPO_PART_SURFACE)
-NEEDS = {"maps": "mesh", "attributes": "mesh", "border": "mesh", "colours": "attributes"}
+NEEDS = {"maps": "mesh", "attributes": "mesh", "border": "mesh", "surface": "mesh", "colours": "attributes"}
 CODECS = {"zstd": c.EBPO_CODEC_ZSTD, "deflate": c.EBPO_CODEC_DEFLATE, "none": c.EBPO_CODEC_NONE}
 RULES = {rule.name.lower(): int(rule) for rule in c.Rule}
 
@@ -44,8 +44,8 @@ def convert(mesh: AnyMesh, output: Path, *, overwrite: bool = False, parts: str 
         faces: (f, 3) integers.
     overwrite: replace an existing file. False: raise ExistingFileError, which is a FileExistsError.
     parts: as `ebpo convert --parts`: the parts to store, such as
-        "mesh,maps,attributes,envelopes,leaf-planes,colours,border,surface", or parts to omit with minus signs,
-        such as "-maps,-colours"; or a list of such names. None: all except leaf-planes and surface.
+        "mesh,maps,attributes,envelopes,leaf-planes,colours,border,surface", or parts to omit or to add with a sign
+        before each, such as "-maps,+surface"; or a list of such names. None: all except leaf-planes and surface.
     weld, weld_distance, orient, fill_holes, flip, drop_duplicates: repair the mesh, as the command
         `ebpo convert` does with these options.
     rule: "nonzero", "evenodd" or "positive": the winding numbers that are inside.
@@ -111,19 +111,20 @@ def parts_of(parts: str | Iterable[str] | None) -> int:
     if parts is None:
         return DEFAULT_PARTS
     given = parts.split(",") if isinstance(parts, str) else list(parts)
-    omits = {name.startswith("-") for name in given}
-    names = {name[1:] if name.startswith("-") else name for name in given}
-    names = {"envelopes" if name == "planes" else name for name in names}  # the name in Info.parts
-    if len(omits) != 1 or not names <= set(PARTS):
-        raise ValueError(f"parts: expected a list of {', '.join(PARTS)}, or of these names with a minus sign "
-                         f"before each, not {','.join(given)!r}")
-    if omits == {True}:
-        names = {name for name, bit in PARTS.items() if bit & DEFAULT_PARTS} - names
-        for name, needed in NEEDS.items():  # the order of NEEDS matters
-            names -= {name} if needed not in names else set()
-    for name in names & set(NEEDS):
-        if NEEDS[name] not in names:
-            raise ValueError(f"parts: {name} needs {NEEDS[name]}; add it, not {','.join(given)!r}")
+    changes = {name[:1] in ("-", "+") for name in given} == {True}  # the parts of the default are changed
+    names = {name for name, bit in PARTS.items() if changes and bit & DEFAULT_PARTS}
+    for name in given:
+        part = name[changes:]
+        part = "envelopes" if part == "planes" else part  # the name in Info.parts
+        if part not in PARTS:
+            raise ValueError(f"parts: expected a list of {', '.join(PARTS)}, or of these names with a minus or plus "
+                             f"sign before each, not {','.join(given)!r}")
+        names = names - {part} if name.startswith("-") else names | {part}
+    for name, needed in NEEDS.items():  # the order of NEEDS matters
+        if name in names and needed not in names:
+            if not changes or "+" + name in given:
+                raise ValueError(f"parts: {name} needs {needed}; add it, not {','.join(given)!r}")
+            names.remove(name)
     return sum(PARTS[name] for name in names)
 
 
