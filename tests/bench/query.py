@@ -342,7 +342,7 @@ def command_line(options):
     words = ["tests/bench/query.py", "BUILD_DIR"] + [pathlib.Path(m).name for m in options.models]
     for what in options.grow:
         words += ["--grow", pathlib.Path(what).name]
-    words += ["--count", str(options.count), "--rounds", str(options.rounds)]
+    words += ["--count", str(options.count), "--rounds", str(options.rounds), "--judged", str(options.judged)]
     if options.sections != ",".join(SECTIONS):
         words += ["--sections", options.sections]
     return shlex.join(words + ["-o", "docs/measured/queries.md"])
