@@ -201,7 +201,7 @@ mkdir -p "$deps/include"
     touch "$deps/.complete"
 }
 folders='core|geometry|hdf5_read|format'
-build_library "" "$folders|construct|levels|query|extras_collide" "" # with all kernels
+build_library "" "$folders|levels|query|extras_collide" "" # with all kernels
 # For the viewers' module, whose size delays the first picture, and for folders in which size matters more than time.
-build_library -small "$folders|io|hdf5_write|mesh|levels_surface|derive_mesh" -Os
+build_library -small "$folders|io|hdf5_write|mesh|construct|levels_surface|derive_mesh" -Os
 build_package
