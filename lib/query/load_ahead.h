@@ -33,17 +33,20 @@ static inline bool ebpo_model_has_envelopes(const ebpo_model *m)
     return ebpo_input_prefetches(&m->file->in) && !m->info->pruned && m->skeletons &&
            m->top->cut_level == m->info->subtree_level;
 }
+
 /* Reads the envelopes of the first levels below the roots of `count` gray subtrees, after one
  * prefetch hint. Reads fewer if the quota of skeletons, or memory for chunks, is used up. After an
  * error, some may have been read. */
 EBPO_MUST_USE ebpo_status ebpo_context_read_envelopes(ebpo_context *context, const uint32_t *below,
                                                       uint64_t count, ebpo_error *error);
+
 /* Returns the envelopes of a subtree that were read, as a top whose level 0 is the subtree's root,
  * or NULL. */
 static inline const ebpo_top *ebpo_context_envelopes(const ebpo_context *context, uint32_t below)
 {
     return context->envelope_count ? context->envelopes_of[below] : NULL;
 }
+
 /* Frees all envelopes that were read. */
 void ebpo_context_drop_envelopes(ebpo_context *context);
 
