@@ -1,9 +1,9 @@
 /* Makes an accel, the acceleration structure of a subtree (accel.h), from the subtree's slice of
  * the file, and estimates its memory.
  *
- * The stages are: grouping of faces into blocks and blocks into a hierarchy (blocks.c), bounds of
- * blocks (block_bounds.c), child tables and leaf records (here). Leaf kinds are found later
- * (leaf_kinds.c).
+ * The stages are: grouping of faces into blocks (blocks.c), a hierarchy over the blocks
+ * (block_tree.c), bounds (block_bounds.c), child tables and leaf records (here). Leaf kinds are
+ * found later (leaf_kinds.c).
  *
  * Memory is estimated from counts, before anything is read. Three estimates are upper bounds for
  * ordinary models only: the estimates of blocks, of the hierarchy over blocks, and of the faces
@@ -195,22 +195,21 @@ static uint64_t kept_bytes(const sizes *size, const block_sizes *count)
 
 /* Returns the most memory that exists at a time while an accel is made. In addition to the memory
  * that is kept, memory is needed first for the mesh and the corners of blocks (`early`), then for
- * extents, then for the nodes (`late`). In all of these stages, memory is needed for the layout
- * (ebpo_layout), whose arrays may have more space than they use, because they grow by half of their
- * size.
+ * extents and the boxes from which the hierarchy is made, then for the nodes (`late`). In all of
+ * these stages, memory is needed for the layout (ebpo_layout), whose nodes may have more space than
+ * they use, because they grow by half of their size.
  *
- * If a model is refused after its layout was made, this layout also fits into the returned maximum,
- * as follows. The layout takes 12 bytes for each block and 60 bytes for each bound (node of the
- * hierarchy). There are at most as many blocks as faces, and 7 bounds for 13 blocks, because
- * join_parts (blocks.c) wraps at least five members first, then four, three, two, two ... With the
- * 8 bytes for each face in renumber_blocks, this is less than the 56 bytes a face that ordinary
- * records, bounds and layouts take. */
+ * If a model is refused after its layout was made, this layout also fits into the returned maximum:
+ * the layout takes at most 4 bytes for each face and a bit, less than the 56 bytes a face that
+ * ordinary records, bounds and layouts take. */
 static uint64_t peak_bytes(const sizes *size, const block_sizes *count)
 {
-    enum { LAYOUT_BLOCK = 16, LAYOUT_BOUND = 60, CORNERS = 25, EXTENT = 72 }; /* bytes of each */
+    /* bytes of each */
+    enum { LAYOUT_BLOCK = 12, LAYOUT_BOUND = 60, CORNERS = 25, EXTENT = 72, BOX = 36 };
     uint64_t layout = count->blocks * LAYOUT_BLOCK + count->bounds * LAYOUT_BOUND,
              early = size->mesh + count->blocks * CORNERS,
-             extents = (count->blocks + count->bounds) * EXTENT, late = size->nodes + size->list,
+             extents = (count->blocks + count->bounds) * EXTENT + count->blocks * BOX,
+             late = size->nodes + size->list,
              after = size->nodes + size->list + size->planes + size->rows,
              kept = kept_bytes(size, count) - after,
              read = size->levels + size->mesh + size->shared + size->maps + size->only_read;
@@ -291,7 +290,8 @@ static ebpo_status accel_fits(ebpo_quota *space, const ebpo_accel_plan *plan, ui
     counts c = counts_of_slice(plan->slice, plan->content);
     sizes size = sizes_of(&c, plan->info);
     size.only_read = 0; /* the slice has been read */
-    block_sizes count = layout ? (block_sizes){ layout->block_count, layout->bound_count, units }
+    block_sizes count = layout ? (block_sizes){ layout->block_count,
+                                                ebpo_layout_nodes_max(layout->block_count), units }
                                : ordinary_sizes(&c, plan->info);
     uint64_t peak = peak_bytes(&size, &count);
     ebpo_quota all = { .most = space->most };
@@ -453,7 +453,7 @@ static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **
     s->nodes.group_count = (uint32_t)groups;
     s->leaf = ebpo_alloc_zero(leaves, sizeof *s->leaf);
     s->leaf_count = (uint32_t)leaves;
-    uint64_t faces = layout->block_count ? layout->block_end[layout->block_count - 1] : 0;
+    uint64_t faces = layout->block_begin[layout->block_count];
     uint32_t *map = *slot_of = ebpo_alloc(faces, sizeof *map);
     bool list = ebpo_grow(&s->list, &w->list_capacity, list_max(refs, leaves, slice->face_count),
                           sizeof *s->list);
@@ -463,7 +463,7 @@ static ebpo_status reserve_space(walk *w, const ebpo_layout *layout, uint32_t **
     ebpo_prefer_huge_pages(s->leaf, leaves * sizeof *s->leaf);
     ebpo_prefer_huge_pages(map, faces * sizeof *map);
     for (uint64_t b = 0; b < layout->block_count; b++)
-        for (uint32_t face = layout->block_begin[b]; face < layout->block_end[b]; face++)
+        for (uint32_t face = layout->block_begin[b]; face < layout->block_begin[b + 1]; face++)
             map[face] = layout->block_number[b] * EBPO_BLOCK + face - layout->block_begin[b];
     return EBPO_OK;
 }

@@ -6,34 +6,47 @@
 #include "core/cpu.h"
 #include "query/accel.h"
 
-/* The layout assigns faces to blocks (at most eight faces each), and blocks to a hierarchy. The
- * layout is made in one walk through the tree, without coordinates. */
+/* Extent of vertices in the subtree's frame, and the sum of the normals of their faces. */
+typedef struct ebpo_extent {
+    double low[3], high[3], normal[3];
+} ebpo_extent;
+
+/* A node of the hierarchy. The blocks below a node are contiguous in ebpo_layout.ordered_number. */
+typedef struct ebpo_layout_node {
+    /* as in ebpo_bound, but a block is given by its index in the layout */
+    uint32_t child[8];
+    uint32_t begin, end; /* the blocks below the node */
+} ebpo_layout_node;
+
+/* The layout assigns faces to blocks (at most eight faces each), and blocks to a hierarchy. */
 typedef struct ebpo_layout {
-    /* [block_count] first face of each block, and one past its last face, as local indices
-     * (accel.h); the blocks together contain all faces, in order */
+    /* [block_count + 1] first face of each block, as local index (accel.h), and the number of
+     * faces; the blocks together contain all faces, in order */
     uint32_t *block_begin;
-    uint32_t *block_end;
-    uint64_t block_count, block_capacity;
+    uint64_t block_count;
+    uint64_t shared_blocks; /* the blocks of shared faces, which are the first blocks */
     /* [block_count] number of each block in the accel: the position of its record, in units
      * (EBPO_MESHLET_UNIT); set by ebpo_accel_number_blocks */
     uint32_t *block_number;
     struct ebpo_block_corners *corners; /* [block_count] valid until the blocks are filled */
-    /* [bound_count] as in ebpo_bound, but a block is given by its index in the layout */
-    uint32_t (*child)[8];
-    /* [bound_count] the blocks below a node are contiguous: the first block, and one past the last
-     * block */
-    uint32_t *first_block;
-    uint32_t *last_block;
-    uint64_t bound_count;
-    /* capacities of child, first_block, last_block, block_end */
-    uint64_t bound_capacity, bound_capacity2, bound_capacity3, block_capacity2;
-    uint32_t top; /* index in `child` of the hierarchy's root */
+    uint32_t *ordered_number;           /* [block_count] block_number in the order of the nodes */
+    ebpo_layout_node *node;             /* [node_count] children come before their parent */
+    uint64_t node_count, node_capacity;
+    uint32_t top; /* index in `node` of the hierarchy's root */
 } ebpo_layout;
 
-/* Makes the layout of a slice. Returns EBPO_E_LIMIT for more than `blocks_max` blocks, which is
- * EBPO_BLOCKS_MAX except in tests. */
+/* Returns the greatest number of nodes of a hierarchy over so many blocks. A cut (block_tree.c)
+ * leaves at least four blocks on each side, so there are at most blocks / 4 nodes above blocks
+ * only, and a seventh of this number above nodes. */
+static inline uint64_t ebpo_layout_nodes_max(uint64_t blocks) { return blocks * 2 / 7 + 4; }
+
+/* Assigns the faces of a slice to blocks, without coordinates. Returns EBPO_E_LIMIT for more than
+ * `blocks_max` blocks, which is EBPO_BLOCKS_MAX except in tests. */
 EBPO_MUST_USE ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice,
                                            uint64_t blocks_max, ebpo_error *error);
+/* Makes the hierarchy over the blocks. extent[i]: of block i. */
+EBPO_MUST_USE ebpo_status ebpo_layout_join(ebpo_layout *layout, const ebpo_extent *extent,
+                                           ebpo_error *error);
 void ebpo_layout_free(ebpo_layout *layout);
 
 /* The inputs from which an accel is made. */
@@ -50,8 +63,8 @@ EBPO_MUST_USE ebpo_status ebpo_accel_number_blocks(ebpo_accel *s, const ebpo_acc
                                                    unsigned threads, ebpo_error *error);
 EBPO_MUST_USE ebpo_status ebpo_accel_fill_blocks(ebpo_accel *s, const ebpo_accel_plan *plan,
                                                  unsigned threads, ebpo_error *error);
-/* Computes the boxes and bounding cylinders of the hierarchy from the filled blocks. */
-EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout,
+/* Makes the hierarchy over the filled blocks, with its boxes and bounding cylinders. */
+EBPO_MUST_USE ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, ebpo_layout *layout,
                                                  unsigned threads, ebpo_error *error);
 /* Makes an empty store of at most `rows_max` rows of leaf planes (ebpo_kind_row). Returns NULL when
  * out of memory. */

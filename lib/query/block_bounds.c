@@ -38,16 +38,13 @@ static const double least_slack = 0x1p-60;
  * value. */
 enum { AXIS_UNIT = 1 << 15, SHORT_MAX = 32766 };
 
-/* Extent of vertices in the subtree's frame, and the sum of the normals of their faces. */
-typedef struct extent {
-    double low[3], high[3], normal[3];
-} extent;
+typedef ebpo_extent extent;
 
 typedef struct job {
     ebpo_accel *s;
     const ebpo_layout *layout;
     const ebpo_block_measures *measures; /* kernels for blocks of floats */
-    extent *of_block, *of_node; /* [block_count] and [bound_count] extents of blocks and nodes */
+    extent *of_block, *of_node; /* [block_count] and [node_count] extents of blocks and nodes */
 } job;
 
 /* Two lanes of doubles. */
@@ -178,10 +175,11 @@ static const extent *extent_of(const job *j, uint32_t child)
 /* Computes the extents of nodes; a node comes after its children. */
 static void extend_nodes(job *j)
 {
-    for (uint64_t n = 0; n < j->layout->bound_count; n++) {
+    for (uint64_t n = 0; n < j->layout->node_count; n++) {
+        const uint32_t *child = j->layout->node[n].child;
         j->of_node[n] = empty_extent;
-        for (int lane = 0; lane < 8 && j->layout->child[n][lane] != EBPO_NO_CHILD; lane++)
-            add_extent(extent_of(j, j->layout->child[n][lane]), &j->of_node[n]);
+        for (int lane = 0; lane < 8 && child[lane] != EBPO_NO_CHILD; lane++)
+            add_extent(extent_of(j, child[lane]), &j->of_node[n]);
     }
 }
 
@@ -287,19 +285,19 @@ static inline void add_to_cylinder(const vertices *v, cylinder_pairs *p)
     }
 }
 
-/* Sets from, to and radius2 of a cylinder around all vertices of the blocks begin .. end - 1 of the
- * layout. The interval from .. to need not contain 0. For example, if the faces are tilted against
- * the axes of coordinates, the middle of the faces' box may be on one side of all faces. */
-static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *out)
+/* Sets from, to and radius2 of a cylinder around all vertices of the blocks `block`[count]. The
+ * interval from .. to need not contain 0. For example, if the faces are tilted against the axes of
+ * coordinates, the middle of the faces' box may be on one side of all faces. */
+static void enclose_wide(const job *j, const uint32_t *block, uint32_t count, cylinder *out)
 {
     cylinder_pairs p = { .from = { INFINITY, INFINITY }, .to = { -INFINITY, -INFINITY } };
     for (int k = 0; k < 3; k++) {
         p.middle[k] = (pair){ out->middle[k], out->middle[k] };
         p.axis[k] = (pair){ out->axis[k], out->axis[k] };
     }
-    for (uint32_t i = begin; i < end; i++) {
+    for (uint32_t i = 0; i < count; i++) {
         vertices v;
-        load_vertices(j->s, j->layout->block_number[i], &v);
+        load_vertices(j->s, block[i], &v);
         add_to_cylinder(&v, &p);
     }
     out->from = least_of(p.from);
@@ -310,7 +308,7 @@ static void enclose_wide(const job *j, uint32_t begin, uint32_t end, cylinder *o
 /* Does the same as enclose_wide for blocks of floats, in single precision. The kernel's coordinates
  * are relative to an origin near the middle. The origin is the sum of two floats; its difference
  * from the middle (`off`) is added at the end. */
-static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder *out)
+static void enclose_narrow(const job *j, const uint32_t *block, uint32_t count, cylinder *out)
 {
     const ebpo_accel *s = j->s;
     ebpo_cylinder_view view = { .scale = (float)s->scale };
@@ -329,7 +327,7 @@ static void enclose_narrow(const job *j, uint32_t begin, uint32_t end, cylinder 
         off2 += off * off;
     }
     view.length2_defect = (float)(1 - square);
-    j->measures->cylinder(s, j->layout->block_number + begin, end - begin, &view, &e);
+    j->measures->cylinder(s, block, count, &view, &e);
     double aside = sqrt((double)e.aside2) + sqrt(off2);
     out->from = (double)e.from + along;
     out->to = (double)e.to + along;
@@ -347,17 +345,20 @@ static cylinder measure_cylinder(const job *j, uint64_t n, int lane, const exten
         ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
         out.middle[k] = (side.low + side.high) / 2;
     }
-    uint32_t child = j->layout->child[n][lane], first = child & ~EBPO_IS_BLOCK, last = first + 1;
+    uint32_t child = j->layout->node[n].child[lane], number = b->child[lane] & ~EBPO_IS_BLOCK,
+             count = 1;
+    const uint32_t *block = &number;
     if (!(child & EBPO_IS_BLOCK)) {
-        first = j->layout->first_block[child];
-        last = j->layout->last_block[child];
+        const ebpo_layout_node *below = &j->layout->node[child];
+        block = j->layout->ordered_number + below->begin;
+        count = below->end - below->begin;
     }
-    cylinders->large |= (uint8_t)((last - first > EBPO_LARGE_CHILD) << lane);
+    cylinders->large |= (uint8_t)((count > EBPO_LARGE_CHILD) << lane);
     choose_axis(e, cylinders, lane, &out);
     if (j->s->wide)
-        enclose_wide(j, first, last, &out);
+        enclose_wide(j, block, count, &out);
     else
-        enclose_narrow(j, first, last, &out);
+        enclose_narrow(j, block, count, &out);
     return out;
 }
 
@@ -429,11 +430,13 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
         memset(b, 0, sizeof *b);
         memset(&j->s->cylinder[n], 0, sizeof j->s->cylinder[n]);
         for (int lane = 0; lane < 8; lane++) {
-            uint32_t child = j->layout->child[n][lane];
+            uint32_t child = j->layout->node[n].child[lane];
             b->child[lane] = child_number(j, child);
             if (child == EBPO_NO_CHILD)
                 continue;
             b->count = (uint8_t)(lane + 1);
+            if (child & EBPO_IS_BLOCK) /* blocks are not in the order of nodes */
+                ebpo_visit_fetch(j->s, b->child[lane]);
             part[lane] = *extent_of(j, child);
         }
         set_boxes(b, &j->of_node[n], part);
@@ -446,19 +449,20 @@ static ebpo_status bound_nodes(void *context, uint64_t begin, uint64_t end, unsi
 
 static ebpo_status reserve_space(job *j, ebpo_error *error)
 {
-    uint64_t count = j->layout->bound_count;
+    uint64_t count = j->layout->node_count;
     ebpo_accel *s = j->s;
+    s->bound_count = (uint32_t)count;
+    s->root_bound = j->layout->top;
     if (count >= PTRDIFF_MAX / (sizeof *s->bound + sizeof *s->cylinder))
         return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->cylinder));
     size_t bounds = (size_t)(count + 1) * sizeof *s->bound,
            cylinders = (size_t)(count + 1) * sizeof *s->cylinder;
     s->bound = aligned_alloc(64, bounds);
     s->cylinder = aligned_alloc(64, cylinders);
-    j->of_block = ebpo_alloc(j->layout->block_count, sizeof *j->of_block);
     ebpo_prefer_huge_pages(s->bound, bounds);
     ebpo_prefer_huge_pages(s->cylinder, cylinders);
     j->of_node = ebpo_alloc(count, sizeof *j->of_node);
-    if (s->bound && s->cylinder && j->of_block && j->of_node)
+    if (s->bound && s->cylinder && j->of_node)
         return EBPO_OK;
     return ebpo_fail_memory(error, count * (sizeof *s->bound + sizeof *s->cylinder));
 }
@@ -472,16 +476,23 @@ static void link_parents(ebpo_accel *s)
                 s->bound[s->bound[n].child[lane]].parent = n;
 }
 
-/* Computes all extents, then all boxes and cylinders. */
-static ebpo_status fill_levels(job *j, unsigned threads, ebpo_error *error)
+/* Makes the hierarchy, then all boxes and cylinders. */
+static ebpo_status fill_levels(job *j, ebpo_layout *layout, unsigned threads, ebpo_error *error)
 {
-    ebpo_status status = ebpo_parallel_for(threads, NULL, j->layout->block_count, 512,
-                                           extend_blocks, j, NULL, "open", error);
+    j->of_block = ebpo_alloc(layout->block_count, sizeof *j->of_block);
+    if (!j->of_block)
+        return ebpo_fail_memory(error, layout->block_count * sizeof *j->of_block);
+    ebpo_status status = ebpo_parallel_for(threads, NULL, layout->block_count, 512, extend_blocks,
+                                           j, NULL, "open", error);
+    if (status == EBPO_OK)
+        status = ebpo_layout_join(layout, j->of_block, error);
+    if (status == EBPO_OK)
+        status = reserve_space(j, error);
     if (status != EBPO_OK)
         return status;
     extend_nodes(j);
-    status = ebpo_parallel_for(threads, NULL, j->layout->bound_count, 64, bound_nodes, j, NULL,
-                               "open", error);
+    status = ebpo_parallel_for(threads, NULL, layout->node_count, 64, bound_nodes, j, NULL, "open",
+                               error);
     if (status == EBPO_OK)
         link_parents(j->s);
     return status;
@@ -496,16 +507,12 @@ static void set_near_rays(ebpo_accel *s)
     s->ray_near = near < 0x1p30 && s->scale > 0 && s->scale < INFINITY ? near : -1;
 }
 
-ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, const ebpo_layout *layout, unsigned threads,
+ebpo_status ebpo_accel_fill_bounds(ebpo_accel *s, ebpo_layout *layout, unsigned threads,
                                    ebpo_error *error)
 {
     job j = { .s = s, .layout = layout, .measures = ebpo_block_measures_best() };
-    s->bound_count = (uint32_t)layout->bound_count;
-    s->root_bound = layout->top;
     s->largest_coordinate = 1;
-    ebpo_status status = reserve_space(&j, error);
-    if (status == EBPO_OK)
-        status = fill_levels(&j, threads, error);
+    ebpo_status status = fill_levels(&j, layout, threads, error);
     if (status == EBPO_OK && s->bound_count)
         s->largest_coordinate = larger_of(1, greatest_coordinate(&s->bound[s->root_bound]));
     set_near_rays(s);

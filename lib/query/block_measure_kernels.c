@@ -90,6 +90,11 @@ static void measure_cylinder(const ebpo_accel *s, const uint32_t *block, uint32_
     for (uint32_t i = 0; i < count; i++) {
         const ebpo_meshlet *m = ebpo_accel_meshlet(s, block[i]);
         const float *v = ebpo_meshlet_floats(m);
+        /* The blocks of a node are not in the order of memory. */
+        const char *later =
+            (const char *)ebpo_accel_meshlet(s, block[i + 4 < count ? i + 4 : count - 1]);
+        for (int line = 0; line < 4; line++)
+            __builtin_prefetch(later + EBPO_MESHLET_UNIT * line);
         for (unsigned at = 0; at < m->vertices; at += 8) {
             f8 x[3];
             for (unsigned k = 0; k < 3; k++)

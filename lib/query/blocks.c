@@ -1,13 +1,9 @@
-/* Makes blocks and the hierarchy over the blocks (accel.h). A block has at most eight faces and the
- * vertices of these faces.
+/* Makes blocks (accel.h). A block has at most eight faces and the vertices of these faces.
  *
- * First, the layout decides which faces are in one block, and builds the hierarchy; the layout uses
- * no coordinates. The new faces of a node (faces that no leaf before the node lists) have
- * consecutive local indices. So neighbouring children with few new faces can share a block. The
- * hierarchy follows the octree: the blocks below an octree node are passed up to the node's parent.
- * If a parent receives more than eight blocks or nodes of the hierarchy, some of these are joined
- * in new nodes of the hierarchy. Then the blocks are measured, numbered and filled in parallel;
- * block_bounds.c computes their bounds. */
+ * First, the layout decides which faces are in one block, without coordinates. The new faces of a
+ * node (faces that no leaf before the node lists) have consecutive local indices. So neighbouring
+ * children with few new faces can share a block. Then the blocks are measured, numbered and filled
+ * in parallel. block_tree.c and block_bounds.c make the hierarchy over the blocks. */
 #include "core/strict_fp.h"
 
 #include <stdlib.h>
@@ -20,218 +16,97 @@
 #include "geometry/level_nodes.h"
 #include "query/accel_parts.h"
 
-/* The result of the walk below a node of the octree. A bundle has either at most eight faces that
- * have no block yet, or at most eight members: blocks or nodes of the hierarchy that contain the
- * octree node's faces. */
-typedef struct bundle {
-    uint32_t begin, end; /* range of faces, as local indices */
-    int members;         /* number of members; 0: the faces have no block yet */
-    uint32_t member[8];  /* as in ebpo_bound.child */
-} bundle;
+/* The faces of a node of the octree, as local indices. */
+typedef struct range {
+    uint32_t begin, end;
+    bool open; /* the faces have no block yet; there are at most eight */
+} range;
 
 typedef struct walk {
-    ebpo_layout *out;
     const ebpo_slice *slice;
+    uint64_t *begins; /* has a bit for each face, and one more: a block begins with this face */
+    uint64_t count;   /* number of blocks */
     /* number of visited gray nodes, and of visited leaves, of each level */
     uint64_t gray[EBPO_LEVELS_MAX], leaf[EBPO_LEVELS_MAX];
-    uint64_t blocks_max;
-    bool failed; /* too many blocks, or out of memory */
 } walk;
 
-/* Adds a block of the faces begin .. end - 1. Returns the block as a member of a bundle. */
-static uint32_t add_block(walk *w, uint32_t begin, uint32_t end)
+/* Makes a block of the faces of a range, if they have no block yet. */
+static void close_range(walk *w, range *r)
 {
-    ebpo_layout *o = w->out;
-    if (o->block_count >= w->blocks_max ||
-        !ebpo_grow(&o->block_begin, &o->block_capacity, o->block_count + 1,
-                   sizeof *o->block_begin) ||
-        !ebpo_grow(&o->block_end, &o->block_capacity2, o->block_count + 1, sizeof *o->block_end)) {
-        w->failed = true;
-        return EBPO_NO_CHILD;
+    if (r->open && r->end > r->begin) {
+        w->begins[r->begin / 64] |= UINT64_C(1) << r->begin % 64;
+        w->count++;
     }
-    o->block_begin[o->block_count] = begin;
-    o->block_end[o->block_count] = end;
-    return (uint32_t)o->block_count++ | EBPO_IS_BLOCK;
+    r->open = false;
 }
 
-/* Adds a node of the hierarchy with the members of a bundle. Returns the node as a member. Until
- * renumber_blocks is called, the node's first_block and last_block are the range of the node's
- * faces. */
-static uint32_t add_bound(walk *w, const bundle *b)
-{
-    ebpo_layout *o = w->out;
-    uint64_t n = o->bound_count;
-    if (w->failed || !ebpo_grow(&o->child, &o->bound_capacity, n + 1, sizeof *o->child) ||
-        !ebpo_grow(&o->first_block, &o->bound_capacity2, n + 1, sizeof *o->first_block) ||
-        !ebpo_grow(&o->last_block, &o->bound_capacity3, n + 1, sizeof *o->last_block)) {
-        w->failed = true;
-        return EBPO_NO_CHILD;
-    }
-    for (int i = 0; i < 8; i++)
-        o->child[n][i] = i < b->members ? b->member[i] : EBPO_NO_CHILD;
-    o->first_block[n] = b->begin;
-    o->last_block[n] = b->end;
-    return (uint32_t)o->bound_count++;
-}
-
-/* Makes a block of the bundle's faces, if they have no block yet. */
-static void close_bundle(walk *w, bundle *b)
-{
-    if (b->members == 0 && b->end > b->begin) {
-        b->member[0] = add_block(w, b->begin, b->end);
-        b->members = 1;
-    }
-}
-
-/* The consecutive bundles begin .. end - 1 of an array, and the number of their members. */
-typedef struct run {
-    int begin, end, members;
-} run;
-
-/* Chooses the bundles that join_parts wraps in a node next: consecutive bundles that are not
- * wrapped yet and have as many members as possible, but at most eight. With emptier nodes, the
- * hierarchy would become deeper. */
-static run choose_run(const bundle *part, int parts, const bool wrapped[8])
-{
-    run best = { 0, 0, 0 };
-    for (int begin = 0; begin < parts; begin++) {
-        int members = 0;
-        for (int end = begin;
-             end < parts && !wrapped[end] && members + part[end].members <= EBPO_BLOCK; end++) {
-            members += part[end].members;
-            if (members > best.members)
-                best = (run){ begin, end + 1, members };
-        }
-    }
-    return best;
-}
-
-/* Returns a bundle with the members of all parts. */
-static bundle gather_parts(const bundle *part, int parts)
-{
-    bundle out = { part[0].begin, part[parts - 1].end, 0, { 0 } };
-    for (int i = 0; i < parts; i++)
-        for (int k = 0; k < part[i].members; k++)
-            out.member[out.members++] = part[i].member[k];
-    return out;
-}
-
-/* Joins consecutive bundles to one bundle of at most eight members. If the bundles together have
- * more members, wraps some of the bundles in nodes of the hierarchy. Changes `part`. */
-static bundle join_parts(walk *w, bundle *part, int parts)
-{
-    bool wrapped[8] = { false };
-    int total = 0;
-    for (int i = 0; i < parts; i++) {
-        close_bundle(w, &part[i]);
-        total += part[i].members;
-    }
-    while (total > EBPO_BLOCK && !w->failed) {
-        run r = choose_run(part, parts, wrapped);
-        bundle all = gather_parts(part + r.begin, r.end - r.begin);
-        total -= all.members - 1;
-        all.member[0] = add_bound(w, &all);
-        all.members = 1;
-        part[r.begin] = all;
-        wrapped[r.begin] = true;
-        memmove(part + r.begin + 1, part + r.end, (size_t)(parts - r.end) * sizeof *part);
-        memmove(wrapped + r.begin + 1, wrapped + r.end, (size_t)(parts - r.end));
-        parts -= r.end - r.begin - 1;
-    }
-    return w->failed ? (bundle){ part[0].begin, part[parts - 1].end, 0, { 0 } }
-                     : gather_parts(part, parts);
-}
-
-/* Splits a range of faces into consecutive blocks of about equal size, with at most eight blocks or
- * nodes below each node of the hierarchy. */
-static bundle split_range(walk *w, uint32_t begin, uint32_t end)
+/* Splits a range of more than eight faces into consecutive blocks of about equal size. */
+static range split_range(walk *w, uint32_t begin, uint32_t end)
 {
     uint64_t count = end - begin;
     if (count <= EBPO_BLOCK)
-        return (bundle){ begin, end, 0, { 0 } };
+        return (range){ begin, end, true };
     uint64_t span = EBPO_BLOCK;
     while (count > span * 8)
         span *= 8;
     uint64_t parts = (count + span - 1) / span;
-    bundle part[8];
-    for (uint64_t i = 0; i < parts; i++)
-        part[i] = split_range(w, begin + (uint32_t)(count * i / parts),
-                              begin + (uint32_t)(count * (i + 1) / parts));
-    return join_parts(w, part, (int)parts);
+    for (uint64_t i = 0; i < parts; i++) {
+        range part = split_range(w, begin + (uint32_t)(count * i / parts),
+                                 begin + (uint32_t)(count * (i + 1) / parts));
+        close_range(w, &part);
+    }
+    return (range){ begin, end, false };
 }
 
-static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin);
+static range walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin);
 
 /* Walks the children of the next gray node of the level. The node's faces begin at `begin`. */
-static bundle walk_gray(walk *w, int depth, uint32_t begin)
+static range walk_gray(walk *w, int depth, uint32_t begin)
 {
     const ebpo_level *level = &w->slice->level[depth + 1];
     uint16_t types = level->types[w->gray[depth]++];
-    bundle part[8];
+    range part[8];
     int parts = 0;
     uint32_t at = begin;
-    for (unsigned octant = 0; octant < 8 && !w->failed; octant++) {
-        bundle b = walk_node(w, depth + 1, ebpo_group_type(types, octant), at);
-        at = b.end;
-        if (b.end == b.begin)
+    for (unsigned octant = 0; octant < 8; octant++) {
+        range r = walk_node(w, depth + 1, ebpo_group_type(types, octant), at);
+        at = r.end;
+        if (r.end == r.begin)
             continue;
-        bundle *last = parts ? &part[parts - 1] : NULL;
-        if (last && last->members == 0 && b.members == 0 && b.end - last->begin <= EBPO_BLOCK)
-            last->end = b.end;
+        range *last = parts ? &part[parts - 1] : NULL;
+        if (last && last->open && r.open && r.end - last->begin <= EBPO_BLOCK)
+            last->end = r.end;
         else
-            part[parts++] = b;
+            part[parts++] = r;
     }
-    if (parts == 0)
-        return (bundle){ begin, at, 0, { 0 } };
-    return parts == 1 ? part[0] : join_parts(w, part, parts);
+    if (parts == 1)
+        return part[0];
+    for (int i = 0; i < parts; i++)
+        close_range(w, &part[i]);
+    return (range){ begin, at, false };
 }
 
 /* Walks the next node of this type in its level. A gray node whose next level is not in the slice
  * is pruned, so it has no faces. */
-static bundle walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
+static range walk_node(walk *w, int depth, ebpo_node_type type, uint32_t begin)
 {
     if (type == EBPO_GRAY && depth + 1 < w->slice->level_count)
         return walk_gray(w, depth, begin);
     if (type == EBPO_LEAF)
         return split_range(w, begin, begin + w->slice->level[depth].leaf_new[w->leaf[depth]++]);
-    return (bundle){ begin, begin, 0, { 0 } };
+    return (range){ begin, begin, false };
 }
 
-/* Sorts blocks in the order of their faces, so that the blocks below a node of the hierarchy are
- * one range. Before the call, the blocks are in the order in which the walk made them. Returns
- * false when out of memory. */
-static bool renumber_blocks(ebpo_layout *o, uint64_t faces)
+/* Lists the blocks' first faces. Returns false when out of memory. */
+static bool list_blocks(const walk *w, uint64_t faces, ebpo_layout *out)
 {
-    uint32_t *at_face = ebpo_alloc(faces + 1, sizeof *at_face), /* block that begins at this face */
-        *end = ebpo_alloc(o->block_count, sizeof *end);         /* new block_end */
-    if (!at_face || !end) {
-        free(at_face);
-        free(end);
+    uint32_t *begin = out->block_begin = ebpo_alloc(w->count + 1, sizeof *begin);
+    if (!begin)
         return false;
-    }
-    for (uint64_t b = 0; b < o->block_count; b++)
-        at_face[o->block_begin[b]] = (uint32_t)b;
-    uint32_t number = 0;
-    for (uint64_t face = 0; face < faces; number++) {
-        uint32_t old = at_face[face];
-        end[number] = o->block_end[old];
-        o->block_end[old] = number; /* from now on, block_end[old] is the block's new index */
-        at_face[face] = number;
-        face = end[number];
-    }
-    at_face[faces] = number;
-    for (uint64_t n = 0; n < o->bound_count; n++) {
-        for (int i = 0; i < 8; i++)
-            if (o->child[n][i] != EBPO_NO_CHILD && o->child[n][i] & EBPO_IS_BLOCK)
-                o->child[n][i] = o->block_end[o->child[n][i] & ~EBPO_IS_BLOCK] | EBPO_IS_BLOCK;
-        o->first_block[n] = at_face[o->first_block[n]];
-        o->last_block[n] = at_face[o->last_block[n]];
-    }
-    for (uint32_t b = 0; b < number; b++)
-        o->block_begin[b] = b ? end[b - 1] : 0;
-    free(o->block_end);
-    free(at_face);
-    o->block_end = end;
+    for (uint64_t i = 0; i <= faces / 64; i++)
+        for (uint64_t left = w->begins[i]; left; left &= left - 1)
+            begin[out->block_count++] = (uint32_t)(64 * i) + (uint32_t)__builtin_ctzll(left);
+    begin[out->block_count] = (uint32_t)faces;
     return true;
 }
 
@@ -239,40 +114,31 @@ ebpo_status ebpo_layout_make(ebpo_layout *out, const ebpo_slice *slice, uint64_t
                              ebpo_error *error)
 {
     memset(out, 0, sizeof *out);
-    walk w = { .out = out, .slice = slice, .blocks_max = blocks_max };
-    bundle part[2];
-    int parts = 0;
-    if (slice->shared_count)
-        part[parts++] = split_range(&w, 0, slice->shared_count);
-    part[parts] =
-        walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), slice->shared_count);
-    if (part[parts].end > part[parts].begin)
-        parts++;
-    if (parts) {
-        bundle all = join_parts(&w, part, parts);
-        if (!w.failed)
-            out->top = add_bound(&w, &all);
-        w.failed = w.failed || !renumber_blocks(out, part[parts - 1].end);
-    }
-    if (!w.failed)
-        return EBPO_OK;
-    bool full = out->block_count >= blocks_max;
-    ebpo_layout_free(out);
-    return full ? ebpo_fail(error, EBPO_E_LIMIT,
-                            "the model has too many faces to be held in memory at once; give a "
-                            "memory budget")
-                : ebpo_fail_memory(error, slice->mesh.face_count * 8);
+    uint64_t faces = slice->mesh.face_count;
+    walk w = { .slice = slice, .begins = ebpo_alloc_zero(faces / 64 + 1, sizeof *w.begins) };
+    if (!w.begins)
+        return ebpo_fail_memory(error, faces / 8);
+    range shared = split_range(&w, 0, slice->shared_count);
+    close_range(&w, &shared);
+    out->shared_blocks = w.count;
+    range owned = walk_node(&w, 0, ebpo_group_type(slice->level[0].types[0], 0), shared.end);
+    close_range(&w, &owned);
+    bool fits = w.count <= blocks_max, listed = fits && list_blocks(&w, owned.end, out);
+    free(w.begins);
+    return listed  ? EBPO_OK
+           : !fits ? ebpo_fail(error, EBPO_E_LIMIT,
+                               "the model has too many faces to be held in memory at once; give a "
+                               "memory budget")
+                   : ebpo_fail_memory(error, w.count * sizeof *out->block_begin);
 }
 
 void ebpo_layout_free(ebpo_layout *layout)
 {
     free(layout->block_begin);
-    free(layout->block_end);
     free(layout->block_number);
     free(layout->corners);
-    free(layout->child);
-    free(layout->first_block);
-    free(layout->last_block);
+    free(layout->ordered_number);
+    free(layout->node);
     memset(layout, 0, sizeof *layout);
 }
 
@@ -306,7 +172,7 @@ enum { TABLE_BITS = 6, TABLE = 1 << TABLE_BITS };
 static const uint32_t *corners_of(const job *j, uint64_t block, unsigned *count)
 {
     uint32_t begin = j->layout->block_begin[block];
-    *count = 3 * (j->layout->block_end[block] - begin);
+    *count = 3 * (j->layout->block_begin[block + 1] - begin);
     return j->mesh->faces + 3 * (uint64_t)begin;
 }
 

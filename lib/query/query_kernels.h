@@ -22,8 +22,7 @@
 typedef uint64_t ebpo_visit;
 
 /* Maximum number of visits on a stack: eight for each level of the hierarchy, which has at most 64
- * levels. (An octree level adds at most one level to the hierarchy, and a long list of one leaf
- * adds at most eleven.) */
+ * levels (block_tree.c: at most 24 levels, and below them nodes are cut into equal parts). */
 enum { EBPO_VISITS_MAX = 64 * 8 };
 
 static inline ebpo_visit ebpo_visit_make(float key, uint32_t child)

@@ -90,7 +90,7 @@ static double squared_diagonal(const ebpo_bound *b, int lane)
 }
 
 /* Returns true if the faces below a child of the hierarchy's root are shared. (Below such a child,
- * either all faces are shared or all are owned: blocks.c.) */
+ * either all faces are shared or all are owned: block_tree.c.) */
 static bool is_shared(const ebpo_accel *s, uint32_t child)
 {
     while (!(child & EBPO_IS_BLOCK))

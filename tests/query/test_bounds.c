@@ -229,6 +229,45 @@ START_TEST(test_block_bounds_same_on_any_cpu)
 }
 END_TEST
 
+/* --- the hierarchy --- */
+
+/* Returns half the surface of a box. */
+static double surface_of(const ebpo_bound *b, int lane)
+{
+    double size[3];
+    for (int k = 0; k < 3; k++) {
+        ebpo_bound_sides side = ebpo_bound_side(b, lane, k);
+        size[k] = side.high - side.low;
+    }
+    return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
+}
+
+/* A random line that meets a convex box meets a box within it with a probability of the ratio of
+ * their surfaces. So the sum of the ratios of all nodes is the number of nodes that a line visits.
+ */
+START_TEST(test_rays_visit_few_nodes)
+{
+    query_model m;
+    query_model_make(&m, "sphere", ebpo_test_sphere((double[3]){ 0, 0, 0 }, 1, 6),
+                     &query_variants[0]);
+    const ebpo_accel *s = m.model->whole;
+    double nodes = 0, blocks = 0, root = 0;
+    for (uint32_t n = 0; n < s->bound_count; n++)
+        for (int lane = 0; lane < s->bound[n].count; lane++)
+            *(s->bound[n].child[lane] & EBPO_IS_BLOCK ? &blocks : &nodes) +=
+                surface_of(&s->bound[n], lane);
+    for (int k = 0; k < 3; k++) {
+        const float *step = s->bound[s->root_bound].step;
+        root += 255. * (double)step[k] * 255 * (double)step[(k + 1) % 3];
+    }
+    /* With nodes that follow the octree, 12.4 nodes; with cuts in equal halves, 22.8. */
+    ck_assert_double_le(1 + nodes / root, 11.8);
+    ck_assert_double_le(blocks / root, 3.7);
+    ck_assert_uint_le(s->bound_count, s->face_count / 32);
+    query_model_free(&m);
+}
+END_TEST
+
 /* --- kernels --- */
 
 enum { KEPT = 64 };
@@ -386,6 +425,7 @@ TEST_SUITE(bounds)
     TCase *bounds = tcase_create("bounds");
     tcase_set_timeout(bounds, 600);
     tcase_add_loop_test(bounds, test_boxes_and_cylinders_contain_faces, 0, query_solid_count());
+    tcase_add_test(bounds, test_rays_visit_few_nodes);
     tcase_add_loop_test(bounds, test_block_bounds_same_on_any_cpu, 0, query_solid_count());
     tcase_add_loop_test(bounds, test_envelope_bounds_hold_exactly, 0, query_solid_count());
     tcase_add_loop_test(bounds, test_bounds_kernels_agree, 0, query_solid_count());
