@@ -627,7 +627,7 @@ START_TEST(test_collide_keeps_transformed_nodes)
     begin_counted_walk(c, &options, &q, &pair);
     ck_assert(c->walk.kernels->start(&c->walk) && c->walk.kernels->run(&c->walk, UINT64_MAX));
     uint64_t transformed = decoded_sides / 6; /* two sides on each axis */
-    ck_assert_uint_eq(c->walk.node_pairs, 126);
+    ck_assert_uint_eq(c->walk.node_pairs, 92);
     ck_assert_uint_le(transformed, 60); /* 106 with half of EBPO_TURNED_NODES */
     ebpo_collider_free(c);
     query_model_free(&m);

@@ -182,7 +182,14 @@ bool ebpo_pair_walk_decide(ebpo_pair_walk *w, uint32_t block_a, uint32_t block_b
     for (unsigned i = 0; i < pairs->count; i++) {
         uint32_t lane_a = pairs->pair[i] & 7, lane_b = pairs->pair[i] >> 3 & 7;
         ebpo_found_pair found = { face_a + lane_a, face_b + lane_b, EBPO_PAIR_CROSSING };
-        if (found.a < w->begin || found.a >= w->end || (w->self && found.a >= found.b))
+        if (w->self) { /* pairs in one block come twice, others once, in either order */
+            uint32_t a = found.a, b = found.b;
+            if (block_a == block_b && a >= b)
+                continue;
+            found.a = a < b ? a : b;
+            found.b = a < b ? b : a;
+        }
+        if (found.a < w->begin || found.a >= w->end)
             continue;
         if (w->neighbours || !(pairs->pair[i] & EBPO_CERTAINLY_CROSSING)) {
             const double(*a)[3] = posed_corners(&posed, w, 0, block_a, lane_a),
