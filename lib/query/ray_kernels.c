@@ -388,11 +388,42 @@ EBPO_EIGHT void ray_walk_in(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stac
     }
 }
 
-/* Walks through a child with the variant of ray_walk_in for this search. */
+/* Maximum number of visits that wait in a walk for all hits. */
+enum { RAY_QUEUE = 2 * EBPO_VISITS_MAX };
+
+/* Walks through a child for all hits. The oldest visit is next, so its memory arrives while the ray
+ * makes other visits. If more than EBPO_VISITS_MAX visits wait, the newest one is next, and the
+ * queue is a stack of at most EBPO_VISITS_MAX more. */
+EBPO_EIGHT void ray_walk_all(ebpo_ray_search *r, uint32_t root, bool wide)
+{
+    const ebpo_accel *s = r->s;
+    uint32_t queue[RAY_QUEUE], begin = 0, end = 1;
+    queue[0] = root;
+    while (begin != end && !r->done) {
+        uint32_t at = end - begin > EBPO_VISITS_MAX ? --end : begin++, next = queue[at % RAY_QUEUE];
+        if (next & EBPO_IS_BLOCK) {
+            ray_block(r, next & ~EBPO_IS_BLOCK, wide);
+            continue;
+        }
+        f8 enter;
+        const ebpo_bound *b = &s->bound[next];
+        for (unsigned lanes = ray_children(r, b, &enter); lanes; lanes &= lanes - 1) {
+            uint32_t child = b->child[(unsigned)__builtin_ctz(lanes)];
+            queue[end++ % RAY_QUEUE] = child;
+            ray_fetch(s, child, wide);
+        }
+    }
+}
+
+/* Walks through a child with the variant of the walk for this search. */
 static void ray_walk_from(ebpo_ray_search *r, uint32_t begin, ebpo_visit *stack)
 {
     bool sorted = r->wants == EBPO_WANTS_FIRST;
-    if (r->s->wide && sorted)
+    if (r->wants == EBPO_WANTS_ALL && r->s->wide)
+        ray_walk_all(r, begin, true);
+    else if (r->wants == EBPO_WANTS_ALL)
+        ray_walk_all(r, begin, false);
+    else if (r->s->wide && sorted)
         ray_walk_in(r, begin, stack, true, true);
     else if (r->s->wide)
         ray_walk_in(r, begin, stack, true, false);

@@ -100,6 +100,19 @@ def query_cell(bench, model, servers, points, query):
             "tails": tails, "count": count}
 
 
+def query_equal(bench, model, server):
+    """Query degenerate and uniform rays with equal numbers of crossings, in turns. Return their ratio for all hits."""
+    files = model.equal_rays(bench.options.count)
+    reports = {raw: [] for raw in files}
+    for turn in range(bench.rounds(model) + 1):
+        for raw, runs in reports.items():
+            report = server.run_query("ray-all", raw)
+            if turn > 0: # the first turn only warms up
+                runs.append(report)
+    uniform, degenerate = (middle(runs) for runs in reports.values())
+    return degenerate / uniform
+
+
 def query_one_model(bench, model, wanted):
     """Return {(points, query): result of query_cell}, structure by structure, because a peer has one tree for each."""
     results = {}
@@ -110,6 +123,8 @@ def query_one_model(bench, model, wanted):
                 servers[peer] = Server(bench, peer, model, *building(peer, model)).__enter__()
             for points, query in cells_of(model, structure):
                 results[points, query] = query_cell(bench, model, servers, points, query)
+            if structure == "rays":
+                results["equal", "ray-all"] = query_equal(bench, model, servers["ebpo"])
         finally:
             for server in servers.values():
                 server.__exit__()
@@ -131,9 +146,9 @@ def section_rays(page, results):
               "*degenerate*: to a vertex, to the middle of an edge, from a vertex, along an axis "
               "through a vertex. Embree: robust scene, high quality, single precision. *Embree "
               "differs, first*: first hits that differ by more than 1e-6 of the box diagonal or that "
-              "only one program finds. *all*: rays with different numbers of hits. A "
-              "degenerate ray hits all faces around its vertex; single precision rarely finds all "
-              "of them.")
+              "only one program finds. *all*: rays with different numbers of hits; single "
+              "precision rarely finds all faces around a vertex. *Equal crossings*: of each number of "
+              "different t per ray, as many degenerate as uniform rays.")
     rows = []
     for model, cells in results.items():
         for points in RAYS:
@@ -172,8 +187,7 @@ def section_points(page, results, query, title, note):
 
 def section_tails(page, results):
     page.text("### Tails", "",
-              "Wall-clock times of single queries, minus the cost of reading the "
-              "clock, for the smallest and the largest model.")
+              "Wall-clock times of single queries, minus the cost of reading the clock.")
     models = list(results)
     page.table(["model", "query", "points", "p50", "p99", "p99.9", "max", "Embree p99.9"],
                [[model.name, query, points]

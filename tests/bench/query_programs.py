@@ -3,6 +3,7 @@
 The programs are this library's and the peers'. Each keeps its model in memory between queries.
 """
 import array
+import collections
 import json
 import math
 import os
@@ -117,6 +118,36 @@ class Model:
                             "--count", count, "--memory", "256MiB", "--save-points", raw,
                             points=points, core=False)
         return raw
+
+    def crossings_of(self, raw):
+        """Return the number of different t of each ray's hits."""
+        hits = self.bench.work / f"{raw.stem}.hits"
+        self.bench.run(self.bench.ebpo, "ray", "--all", "--raw", "-o", hits, self.file, raw, core=False)
+        values, words = array.array("d", hits.read_bytes()), array.array("Q", hits.read_bytes())
+        crossings, at = [], 0
+        while at < len(words):
+            end = at + 1 + 3 * words[at]
+            crossings.append(len(set(values[at + 1:end:3])))
+            at = end
+        return crossings
+
+    def equal_rays(self, count):
+        """Return files of uniform and of degenerate rays: of each number of crossings, as many of both kinds, the
+        first ones.
+        """
+        files = [self.queries_of(points, count, True) for points in ("uniform", "degenerate")]
+        crossings = [self.crossings_of(raw) for raw in files]
+        common = collections.Counter(crossings[0]) & collections.Counter(crossings[1])
+        chosen = []
+        for raw, numbers in zip(files, crossings):
+            rays, left = raw.read_bytes(), common.copy()
+            chosen.append(raw.with_suffix(".equal.raw"))
+            with open(chosen[-1], "wb") as out:
+                for i, number in enumerate(numbers):
+                    if left[number]:
+                        left[number] -= 1
+                        out.write(rays[48 * i:48 * (i + 1)])
+        return chosen
 
     def hard(self, rays, count):
         raw = self.bench.work / f"{self.name}.hard{'.rays' if rays else ''}.{count}.raw"

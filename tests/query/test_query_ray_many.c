@@ -619,6 +619,59 @@ START_TEST(test_other_rays_take_turns)
 }
 END_TEST
 
+/* A walk for all hits visits the nodes of a level before the next level, so that memory is fetched
+ * for one node while others are evaluated. */
+START_TEST(test_walk_for_all_hits_rarely_descends)
+{
+    enum { RAYS = 640 };
+    const double centre[3] = { 0 };
+    const ebpo_ray_hit *hits;
+    uint64_t count;
+    query_model m;
+    query_model_make(&m, "sphere", ebpo_test_sphere(centre, 1, 5), &query_variants[0]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    ebpo_ray *rays = make_rays(&m, RAYS, 5);
+    counted_accel = m.context->model->whole;
+    decoded_sides = descents = 0;
+    for (int i = 0; i < RAYS; i++)
+        ASSERT_OK(ebpo_ray_all(m.context, rays[i].origin, rays[i].direction, rays[i].t_max, &hits,
+                               &count, error));
+    counted_accel = NULL;
+    /* a node has six sides */
+    ck_assert_msg(descents > 100 && 4 * descents < decoded_sides / 6, "%llu descents, %llu sides",
+                  (unsigned long long)descents, (unsigned long long)decoded_sides);
+    free(rays);
+    query_model_free(&m);
+}
+END_TEST
+
+/* More blocks are on the ray's way than the queue of a walk for all hits has space for. */
+START_TEST(test_walk_for_all_hits_has_space)
+{
+    enum { BOXES = 3000 };
+    const double from[3] = { 0.3, 0.4, -1 }, up[3] = { 0, 0, 1 };
+    const ebpo_ray_hit *hits;
+    uint64_t count;
+    ebpo_mesh mesh = { 0 };
+    query_model m;
+    for (int i = 0; i < BOXES; i++) {
+        double low[3] = { 0, 0, 2 * i }, high[3] = { 1, 1, 2 * i + 1 };
+        ebpo_mesh box = ebpo_test_box(low, high, 1);
+        ebpo_test_append(&mesh, &box);
+        ebpo_mesh_free(&box);
+    }
+    query_model_make(&m, "boxes", mesh, &query_variants[4]);
+    m.context->model->kernels.ray = &ebpo_ray_kernels_counted;
+    blocks_read = 0;
+    ASSERT_OK(ebpo_ray_all(m.context, from, up, INFINITY, &hits, &count, error));
+    ck_assert_uint_gt(blocks_read, 2 * RAY_QUEUE);
+    ck_assert_uint_eq(count, 2 * BOXES);
+    for (uint64_t i = 0; i < count; i++)
+        ck_assert_double_eq(hits[i].t, (double)i + 1);
+    query_model_free(&m);
+}
+END_TEST
+
 /* Rays in the plane of many faces have so many candidates that some are tested during the walk,
  * between the turns of other rays. */
 START_TEST(test_many_hits_during_turns)
@@ -814,6 +867,8 @@ TEST_SUITE(query_ray_many)
     tcase_add_test(many, test_few_rays_of_packet_read_few_rows);
     tcase_add_test(many, test_coherent_rays_begin_few_searches);
     tcase_add_loop_test(many, test_other_rays_take_turns, EBPO_WANTS_FIRST, EBPO_WANTS_ALL + 1);
+    tcase_add_test(many, test_walk_for_all_hits_rarely_descends);
+    tcase_add_test(many, test_walk_for_all_hits_has_space);
     tcase_add_test(many, test_many_hits_during_turns);
     tcase_add_test(many, test_memory_is_prefetched);
     tcase_add_test(many, test_hits_at_vertex_need_few_exact_comparisons);
