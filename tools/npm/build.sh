@@ -146,7 +146,7 @@ EOF
             -Dhdf5=disabled -Dhttp=disabled -Dassimp=disabled -Drender=disabled -Dcaptions=disabled \
             -Dqhull=disabled -Dtests=disabled -Dchart_js=none >"$folder/meson.log"
     ninja -C "$build" build.ninja >/dev/null # lists files that are new since the last build
-    objects=$(ninja -C "$build" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E "/($2)_[^/]*\.o\$")
+    objects=$(ninja -C "$build" -t targets all | sed -n 's/: c_COMPILER$//p' | grep -E "/($2)[^/]*\.o\$")
     # shellcheck disable=SC2086
     ninja -C "$build" -j"$jobs" $objects >"$folder/ninja.log" ||
         { tail -n 20 "$folder/ninja.log" >&2; exit 1; }
@@ -201,7 +201,7 @@ mkdir -p "$deps/include"
     touch "$deps/.complete"
 }
 folders='core|geometry|hdf5_read|format'
-build_library "" "$folders|levels|query|extras_collide" "" # with all kernels
+build_library "" "$folders|levels|query_[^mws]|extras_collide" "" # with all kernels
 # For the viewers' module, whose size delays the first picture, and for folders in which size matters more than time.
-build_library -small "$folders|io|hdf5_write|mesh|construct|levels_surface|derive_mesh" -Os
+build_library -small "$folders|io|hdf5_write|mesh|construct|query_[mws]|levels_surface|derive_mesh" -Os
 build_package
