@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "query/accel_parts.h"
+#include "query/query_kernels.h"
 #include "check_main.h"
 #include "query/query_node.h"
 #include "query_support.h"
@@ -268,6 +269,94 @@ START_TEST(test_rays_visit_few_nodes)
 }
 END_TEST
 
+/* Sets the extents of blocks. kind: 0: random; 1: twice as far and as large as the block before, so
+ * that cuts separate few blocks; 2: equal; 3: infinite or not a number. */
+static void set_extents(ebpo_extent *extent, uint32_t count, int kind, uint64_t *state)
+{
+    for (uint32_t i = 0; i < count; i++)
+        for (int k = 0; k < 3; k++) {
+            double at = kind == 0   ? (double)(ebpo_test_random(state) % 1000)
+                        : kind == 1 ? ldexp(1, (int)(i % 120))
+                        : kind == 2 ? 1
+                        : i % 2     ? INFINITY
+                                    : NAN;
+            extent[i].low[k] = at;
+            extent[i].high[k] = kind == 1 ? 2 * at : at + 1;
+        }
+}
+
+/* A walk through the hierarchy of a layout. place[b]: index of block b in the order of nodes. */
+typedef struct layout_walk {
+    const ebpo_layout *layout;
+    uint32_t *place, nodes, blocks;
+    int depth; /* the greatest depth of a node */
+} layout_walk;
+
+/* Checks that the blocks below a node are in its range, and that they are all shared or all owned
+ * if the node is not the root. */
+static void check_layout_node(layout_walk *w, uint32_t number, int depth)
+{
+    const ebpo_layout *layout = w->layout;
+    const ebpo_layout_node *n = &layout->node[number];
+    bool shared = layout->ordered_number[n->begin] < layout->shared_blocks;
+    w->nodes++;
+    w->depth = depth > w->depth ? depth : w->depth;
+    for (int lane = 0; lane < 8 && n->child[lane] != EBPO_NO_CHILD; lane++) {
+        uint32_t child = n->child[lane], block = child & ~EBPO_IS_BLOCK;
+        if (child & EBPO_IS_BLOCK) {
+            ck_assert(w->place[block] >= n->begin && w->place[block] < n->end);
+            ck_assert(depth == 0 || shared == (block < layout->shared_blocks));
+            w->blocks++;
+            continue;
+        }
+        ck_assert_uint_lt(child, number); /* children come first */
+        const ebpo_layout_node *below = &layout->node[child];
+        ck_assert(below->begin >= n->begin && below->end <= n->end && below->begin < below->end);
+        bool below_shared = layout->ordered_number[below->begin] < layout->shared_blocks;
+        ck_assert(depth == 0 || shared == below_shared);
+        check_layout_node(w, child, depth + 1);
+    }
+}
+
+/* Makes and checks the hierarchy over blocks with these extents. */
+static void check_layout(uint32_t count, uint32_t shared, ebpo_extent *extent)
+{
+    ebpo_layout layout = { .block_count = count, .shared_blocks = shared };
+    layout.block_number = calloc(count, sizeof *layout.block_number);
+    layout_walk w = { .layout = &layout, .place = calloc(count, sizeof *w.place) };
+    for (uint32_t b = 0; b < count; b++)
+        layout.block_number[b] = b;
+    ASSERT_OK(ebpo_layout_join(&layout, extent, error));
+    for (uint32_t i = 0; i < count; i++)
+        w.place[layout.ordered_number[i]] = i;
+    check_layout_node(&w, layout.top, 0);
+    ck_assert_uint_eq(w.blocks, count);
+    ck_assert_uint_eq(w.nodes, layout.node_count);
+    ck_assert_uint_le(layout.node_count, ebpo_layout_nodes_max(count));
+    ck_assert_int_lt(w.depth, EBPO_VISITS_MAX / 8);
+    free(w.place);
+    ebpo_layout_free(&layout);
+}
+
+/* Each block is in the hierarchy once, and the numbers of nodes and of levels are bounded, for any
+ * extents, also of damaged files. */
+START_TEST(test_layout_is_bounded_for_any_extents)
+{
+    enum { MOST = 200000, SMALL = 700 };
+    ebpo_extent *extent = calloc(MOST, sizeof *extent);
+    uint64_t state = 11;
+    for (uint32_t count = 1; count <= SMALL; count++) {
+        set_extents(extent, count, _i, &state);
+        const uint32_t shared[] = { 0, 1, count / 3, count - 1, count };
+        for (size_t i = 0; i < sizeof shared / sizeof *shared; i++)
+            check_layout(count, shared[i], extent);
+    }
+    set_extents(extent, MOST, _i, &state);
+    check_layout(MOST, 0, extent);
+    free(extent);
+}
+END_TEST
+
 /* --- kernels --- */
 
 enum { KEPT = 64 };
@@ -426,6 +515,7 @@ TEST_SUITE(bounds)
     tcase_set_timeout(bounds, 600);
     tcase_add_loop_test(bounds, test_boxes_and_cylinders_contain_faces, 0, query_solid_count());
     tcase_add_test(bounds, test_rays_visit_few_nodes);
+    tcase_add_loop_test(bounds, test_layout_is_bounded_for_any_extents, 0, 4);
     tcase_add_loop_test(bounds, test_block_bounds_same_on_any_cpu, 0, query_solid_count());
     tcase_add_loop_test(bounds, test_envelope_bounds_hold_exactly, 0, query_solid_count());
     tcase_add_loop_test(bounds, test_bounds_kernels_agree, 0, query_solid_count());
