@@ -2,6 +2,7 @@
  * - for any motion and rotation of device and tool, no point passes a face or gets closer than half
  *   a skin (checked by exact arithmetic)
  * - force and torque on a plane, and the energy, follow the formulas
+ * - a ball follows the device over a rough surface
  * - a haptic step calls nothing that could delay it */
 #include <stdlib.h>
 #include <ebpo/haptic.h>
@@ -477,6 +478,57 @@ START_TEST(test_haptic_step_time_with_many_points)
 }
 END_TEST
 
+/* A ball of 2,000 points follows the device over a rough sphere. Its points do not jam where they
+ * touch two faces. */
+START_TEST(test_haptic_ball_slides_on_rough_sphere)
+{
+    enum { STEPS = 4000 };
+    static double point[2000][3];
+    static const double centre[3] = { 0, 0, 0 }, above[3] = { 0, 0, 1.4 };
+    query_model m;
+    judged j = { .options = EBPO_HAPTIC_OPTIONS_INIT };
+    ebpo_haptic_tool_result r = { .flags = 0 };
+    ebpo_mesh rough = ebpo_test_sphere(centre, 1, 6);
+    uint64_t state = 5;
+    for (uint64_t v = 0; v < rough.vertex_count; v++) {
+        double radius = 1 + 0.01 * (ebpo_test_random_unit(&state) - 0.5);
+        for (int k = 0; k < 3; k++)
+            rough.xyz64[3 * v + (uint64_t)k] *= radius;
+    }
+    query_model_make(&m, "rough sphere", rough, &query_variants[0]);
+    for (int p = 0; p < 2000; p++) {
+        double z = 1 - (2 * p + 1) / 2000.0, wide = sqrt(1 - z * z);
+        point[p][0] = 0.1 * wide * cos(2.4 * p);
+        point[p][1] = 0.1 * wide * sin(2.4 * p);
+        point[p][2] = 0.1 * z;
+    }
+    j.options.kind = EBPO_HAPTIC_TOOL;
+    j.options.points = (const double(*)[3])point;
+    j.options.point_count = 2000;
+    j.options.faces = 131072;
+    ASSERT_OK(ebpo_haptic_new(m.model, &j.options, above, &j.haptic, error));
+    for (int i = 0; i < STEPS; i++) {
+        double angle = 1.2 * i / STEPS, far = fmax(1.0334, 1.4 - i / 900.0);
+        double tilt = 0.2 * sin(15.0 * i / STEPS);
+        const double device[3] = { far * sin(angle), far * tilt, far * cos(angle) };
+        const double turn[4] = { 0, 0, 0, 1 };
+        for (int patience = 5000; patience > 0; patience--) {
+            ebpo_haptic_step_tool(j.haptic, device, turn, &r);
+            if (!(r.flags & EBPO_HAPTIC_WAITING))
+                break;
+            pause_a_little();
+        }
+        double apart[3];
+        for (int k = 0; k < 3; k++)
+            apart[k] = r.proxy[k] - device[k];
+        /* At most 0.16, and 1 at the end if a jam of points is not ended. */
+        ck_assert_msg(length(apart) < 0.3, "step %d: the ball is %g behind", i, length(apart));
+    }
+    ebpo_haptic_free(j.haptic);
+    query_model_free(&m);
+}
+END_TEST
+
 static int by_gap(const void *a, const void *b)
 {
     const double *x = a, *y = b;
@@ -518,6 +570,7 @@ TEST_SUITE(haptic_tool)
     tcase_add_test(tools, test_haptic_friction_holds_plate);
     tcase_add_test(tools, test_haptic_step_time_with_many_points);
     tcase_add_test(tools, test_haptic_tool_keeps_nearest_contacts);
+    tcase_add_test(tools, test_haptic_ball_slides_on_rough_sphere);
     suite_add_tcase(suite, tools);
     return suite;
 }
